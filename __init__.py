@@ -1,0 +1,36 @@
+"""Demsmith mends, compresses and sharpens elevation models, inside QGIS and out of it.
+
+This folder is the QGIS plugin and the Python package at once. Nothing but this file is read
+when QGIS loads the plugin or Python imports the package: the public functions are looked up at
+first use (PEP 562), and QGIS's classes when QGIS asks for them.
+"""
+
+__version__ = "0.1.0"
+
+_PUBLIC = {
+    "fill_voids": "demsmith.core.voids",
+    "fill_file": "demsmith.core.voids",
+    "read_raster": "demsmith.core.raster",
+    "write_raster": "demsmith.core.raster",
+}
+
+__all__ = ["__version__", *_PUBLIC]
+
+
+def __getattr__(name):
+    if name in _PUBLIC:
+        from importlib import import_module
+
+        return getattr(import_module(_PUBLIC[name]), name)
+    raise AttributeError("module 'demsmith' has no attribute '{}'".format(name))
+
+
+def __dir__():
+    return sorted(__all__)
+
+
+def classFactory(iface):  # noqa: N802, the name QGIS looks for
+    """Give QGIS the plugin."""
+    from demsmith.plugin.main import DemsmithPlugin
+
+    return DemsmithPlugin(iface)

@@ -1,0 +1,1 @@
+"""NumPy in, NumPy out: everything Demsmith computes. Nothing here imports QGIS."""

@@ -1,0 +1,170 @@
+"""MCMD with relaxed generations: the most accurate variant, void by void.
+
+The paper's bottom-up pass lets a void's coarse lattice points take the elevations of cells that
+lie off to one side, and the top-down pass then hangs straight strings between them, so slopes
+break at the rim. Here every generation of midpoints, after it is predicted from its ascendants,
+is relaxed against the known ground around it to the surface of least bending (with a little
+tension for large voids, after Smith and Wessel 1990, "Gridding with continuous curvature splines
+in tension", Geophysics 55), by successive over-relaxation. The sweeps double with each coarser
+level while the points quarter, so the work stays proportional to the number of void cells.
+"""
+
+import numpy as np
+
+from demsmith.core import parallel
+from demsmith.core.mcmd.lattice import Lattice, metres
+from demsmith.core.progress import SILENT, Span, checkpoint
+
+FINEST_SWEEPS = 4
+OMEGA = 1.7
+TENSION_CELLS = 12.0
+_LARGE = 200_000
+_BLOCK = 4_000_000
+
+
+def relax_voids(
+    values,
+    voids,
+    selected,
+    starts,
+    *,
+    pixel_size=None,
+    tension=None,
+    displacement=None,
+    lattice=None,
+    threads=None,
+    progress=SILENT,
+):
+    """Fill voids in place by MCMD with relaxed generations.
+
+    Each void's surface depends on the known ground around it, the lattice's origin and the
+    options alone: on no other void, nor on the number of threads.
+
+    Parameters
+    ----------
+    values : (H, W) float32 or float64 array, C order
+        Elevations; the cells of the selected voids are overwritten.
+    voids : demsmith.core.voids.Voids
+        All voids of the raster.
+    selected : (N,) int array
+        The numbers of those to fill.
+    starts : (N,) float64 array
+        The elevation each begins with, such as its rim's mean.
+    pixel_size : optional
+        Ground metres per cell, see `demsmith.core.mcmd.lattice.metres`.
+    tension : float, optional
+        Distance [m] over which bending gives way to stretching; default: 12 rows.
+    displacement : Displacement, optional
+        Random roughness to add; default: none.
+    lattice : Lattice, optional
+        Default: one that begins at the raster's first cell.
+
+    Raises
+    ------
+    Cancelled
+        If ``progress`` asks to stop; ``values`` is then half filled.
+    """
+    from demsmith.core.mcmd._relaxed import make_stencils
+
+    if not selected.size:
+        return
+    lattice = lattice or Lattice.covering(values.shape)
+    offsets = (-lattice.row, -lattice.column)
+    dx, dy = metres(values.shape, pixel_size)
+    length = TENSION_CELLS * dy if tension is None else tension
+    levels = max(values.shape).bit_length()
+    stencils = make_stencils((dy / dx) ** 2, (dy / length) ** 2, OMEGA, levels)
+
+    cells = voids.cells[selected]
+    large = cells > _LARGE
+    share = float(cells[large].sum() / cells.sum())
+    _fill_large(
+        values, voids, selected[large], starts[large], stencils, offsets, Span(progress, 0, share)
+    )
+    _fill_small(
+        values, voids, selected[~large], starts[~large], stencils, offsets,
+        threads, Span(progress, share, 1),
+    )  # fmt: skip
+    if displacement is not None:
+        _displace(values, voids, selected, displacement, offsets, threads, progress)
+
+
+def _fill_small(values, voids, selected, starts, stencils, offsets, threads, progress):
+    from demsmith.core.mcmd._relaxed import fill_voids
+
+    def task(span):
+        def fill():
+            fill_voids(
+                values, voids.labels, voids.runs, voids.first_run, selected[span], starts[span],
+                stencils, OMEGA, *offsets, FINEST_SWEEPS,
+            )  # fmt: skip
+
+        return fill
+
+    _over_spans(voids.cells[selected], task, threads, progress)
+
+
+def _over_spans(cells, make_task, threads, progress):
+    spans = parallel.even_spans(cells, 16 * parallel.thread_count(threads))
+    parallel.run(
+        [make_task(slice(begin, end)) for begin, end in spans],
+        weights=[cells[begin:end].sum() for begin, end in spans],
+        threads=threads,
+        progress=progress,
+    )
+
+
+def _fill_large(values, voids, selected, starts, stencils, offsets, progress):
+    """Fill voids one by one, sweep by sweep, so that progress and cancel come in between."""
+    for i, (void, start) in enumerate(zip(selected, starts, strict=True)):
+        part = Span(progress, i / selected.size, (i + 1) / selected.size)
+        _fill_one(values, voids, int(void), start, stencils, offsets, part)
+
+
+def _fill_one(values, voids, void, start, stencils, offsets, progress):
+    from demsmith.core.mcmd import _relaxed as kernels
+
+    a, b = int(voids.first_run[void]), int(voids.first_run[void + 1])
+    room = int(voids.cells[void])
+    points, rows = np.empty(room, np.uint64), np.empty(room, np.int32)
+    usable = np.empty(room, np.int16)
+    kernels.flood(values, voids.runs, a, b, start)
+    coarsest = kernels.coarsest_level(voids.runs, a, b)
+    # A level has a quarter of the next finer one's points and twice its sweeps.
+    done = 0.0
+    for level in range(coarsest, -1, -1):
+        count = kernels.gather(
+            voids.labels, voids.runs, a, b, void + 1, level, *offsets, points, rows, usable
+        )
+        if count:
+            kernels.predict(values, points, usable, count, level)
+        sweeps = FINEST_SWEEPS << level
+        blocks = [(low, min(low + _BLOCK, count)) for low in range(0, count, _BLOCK)]
+        # The coarse levels' many sweeps over few points go in bundles of about a block's work.
+        bundle = max(1, _BLOCK // max(count, 1) // 2 * 2)
+        for sweep in range(0, sweeps, bundle):
+            last = min(sweep + bundle, sweeps)
+            for low, high in blocks if sweep % 2 == 0 else reversed(blocks):
+                kernels.relax(
+                    values, points, rows, usable, low, high, level, stencils, OMEGA, sweep, last
+                )
+                checkpoint(progress, done + 0.5 ** (level + 1) * sweep / sweeps)
+        done += 0.5 ** (level + 1)
+
+
+def _displace(values, voids, selected, displacement, offsets, threads, progress):
+    from demsmith.core.mcmd._displacement import displace_voids
+
+    sums = np.zeros(values.shape)
+    amplitude = displacement.by_level()
+
+    def task(span):
+        def displace():
+            displace_voids(
+                values, voids.labels, voids.runs, voids.first_run, selected[span], sums,
+                amplitude, displacement.r_t, displacement.seed, *offsets,
+            )  # fmt: skip
+
+        return displace
+
+    _over_spans(voids.cells[selected], task, threads, progress)

@@ -1,0 +1,108 @@
+"""Where an output may be written, and how it gets there whole or not at all."""
+
+import contextlib
+import os
+import shutil
+import tempfile
+
+from demsmith.core.errors import InputError, OutputError
+from demsmith.core.raster.opening import files_of
+
+_EXTENSIONS = (".tif", ".tiff")
+# Files that GDAL reads along with a GeoTIFF; those of an overwritten one would speak of the old.
+_SIDECARS = (".aux.xml", ".ovr", ".msk", ".msk.ovr")
+
+
+def check_output(path, *, inputs=(), overwrite=False):
+    """Refuse an output that cannot be written, before any work is done for it.
+
+    Parameters
+    ----------
+    path : str or path-like
+        Where a GeoTIFF is to be written.
+    inputs : iterable of str or path-like
+        Rasters that are read; neither they nor files they are made of may be overwritten.
+    overwrite : bool
+        Whether another existing file may be.
+
+    Raises
+    ------
+    InputError
+        If the name is no GeoTIFF's, or it is one of the inputs.
+    OutputError
+        If the folder is missing or not writable, or the file exists.
+    """
+    path = os.fspath(path)
+    if not path.lower().endswith(_EXTENSIONS):
+        raise InputError(f"output '{path}' must be a GeoTIFF: end its name in .tif")
+    check_place(path, inputs=inputs, overwrite=overwrite)
+
+
+def check_place(path, *, inputs=(), overwrite=False):
+    """As `check_output`, for a file of any kind."""
+    path = os.fspath(path)
+    folder = os.path.dirname(os.path.abspath(path))
+    if not os.path.exists(folder):
+        raise OutputError(f"cannot write '{path}': there is no folder '{folder}'; make it first")
+    if not os.path.isdir(folder):
+        raise OutputError(f"cannot write '{path}': '{folder}' is a file, not a folder")
+    if os.path.isdir(path):
+        raise OutputError(f"cannot write '{path}': it is a folder; give a file's name")
+    if os.path.lexists(path):
+        _refuse_input(path, inputs)
+        if not overwrite:
+            raise OutputError(
+                f"'{path}' exists already; give another name, or allow it to be overwritten "
+                "(--overwrite)"
+            )
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise OutputError(f"cannot write '{path}': folder '{folder}' is not writable")
+
+
+def _refuse_input(path, inputs):
+    if not os.path.exists(path):
+        return
+    for source in inputs:
+        for name in files_of(os.fspath(source)):
+            if os.path.samefile(path, name):
+                raise InputError(
+                    f"output '{path}' is an input (of '{source}'); give it another name"
+                )
+
+
+@contextlib.contextmanager
+def whole_or_nothing(path):
+    """Yield a path in a new folder beside ``path``; what is written there is then moved here.
+
+    The file has its final base name already, so sidecars written with it come along under
+    their right names. If the body raises, nothing is left behind, and what was at ``path``
+    before is untouched.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written to.
+    """
+    folder, name = os.path.split(os.path.abspath(path))
+    try:
+        workshop = tempfile.mkdtemp(prefix=".demsmith-", dir=folder)
+    except OSError as error:
+        raise OutputError(f"cannot write '{path}': {error.strerror}") from None
+    try:
+        yield os.path.join(workshop, name)
+        made = sorted(os.listdir(workshop), key=lambda other: other == name)  # the raster last
+        try:
+            for other in made:
+                os.replace(os.path.join(workshop, other), os.path.join(folder, other))
+            for suffix in _SIDECARS:
+                if name + suffix not in made:
+                    _remove(os.path.join(folder, name + suffix))
+        except OSError as error:
+            raise OutputError(f"cannot write '{path}': {error.strerror}") from None
+    finally:
+        shutil.rmtree(workshop, ignore_errors=True)
+
+
+def _remove(path):
+    with contextlib.suppress(FileNotFoundError):
+        os.remove(path)

@@ -1,0 +1,256 @@
+"""Void filling: every void of an array gets elevations, every known cell keeps its own."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from demsmith.core.errors import InputError
+from demsmith.core.mcmd import Displacement, Lattice, interpolate, relax_voids
+from demsmith.core.options import validate
+from demsmith.core.progress import SILENT
+from demsmith.core.voids.labelling import Rims, Voids, find_voids, survey_rims
+from demsmith.core.voids.options import FillOptions
+
+ORIGINAL, FILLED, LEFT = 0, 1, 2
+"""What a source map says of a cell: known before, filled, or a void that was left as it was."""
+
+_BLOCK_CELLS = 1 << 20
+
+
+@dataclass(frozen=True)
+class Filled:
+    """A filled raster and what is known of its voids.
+
+    Attributes
+    ----------
+    values : (H, W) array
+        Elevations, in the data type of the input unless another was asked for. Voids that were
+        left as they were keep the input's values.
+    voids : Voids
+    rims : Rims
+    selected : (N,) int64 array
+        The numbers of the voids that were filled.
+    """
+
+    values: np.ndarray
+    voids: Voids
+    rims: Rims
+    selected: np.ndarray
+
+    @property
+    def cells_filled(self):
+        """Number of cells that were given an elevation."""
+        return int(self.voids.cells[self.selected].sum())
+
+    def source(self):
+        """Map where each elevation comes from.
+
+        Returns
+        -------
+        (H, W) uint8 array
+            0 original, 1 filled, 2 a void left as it was.
+        """
+        by_label = np.full(len(self.voids) + 1, LEFT, np.uint8)
+        by_label[0] = ORIGINAL
+        by_label[self.selected + 1] = FILLED
+        return by_label[self.voids.labels]
+
+    def left(self):
+        """Give the (H, W) bool mask of void cells that were left as they were."""
+        by_label = np.ones(len(self.voids) + 1, bool)
+        by_label[0] = False
+        by_label[self.selected + 1] = False
+        return by_label[self.voids.labels]
+
+
+def fill_voids(
+    values,
+    void=None,
+    *,
+    options=None,
+    pixel_size=None,
+    lattice=None,
+    d_max=None,
+    out=None,
+    threads=None,
+    progress=SILENT,
+    **parameters,
+):
+    """Fill the voids of an elevation array.
+
+    Parameters
+    ----------
+    values : (H, W) array of a real or integer type
+        Elevations [m].
+    void : (H, W) bool array, optional
+        True where there is no elevation. Default: where ``values`` is not finite.
+    options : FillOptions, optional
+        How to fill; its fields can as well be given as keywords of their own.
+    pixel_size : float, (float, float) or (array, array), optional
+        Ground metres per cell: both ways, or east-west and north-south, each one number or one by
+        row. Default: 1.
+    lattice : Lattice, optional
+        MCMD's lattice. Default: the smallest from the first cell. A tile of a mosaic names the
+        mosaic's, so that it computes what the merged raster would.
+    d_max : float, optional
+        Distance [m] at which the curves of ``l`` and ``l_bu`` end. Default: the raster's diagonal.
+    out : (H, W) array, optional
+        Where to write, of the same type as ``values``; ``values`` itself fills in place.
+    threads : int, optional
+        Default: one for each core. The result does not depend on it.
+    progress : Progress, optional
+
+    Returns
+    -------
+    Filled
+
+    Raises
+    ------
+    InputError
+        If the arrays do not fit, nothing is known, or an option is out of range.
+    Cancelled
+        If ``progress`` asks to stop; ``out`` is then half filled.
+
+    Examples
+    --------
+    A hole in a plane comes back as the plane:
+
+    >>> z = np.add.outer(np.arange(9.0), 2 * np.arange(9.0))
+    >>> holed = z.copy()
+    >>> holed[3:6, 4:6] = np.nan
+    >>> filled = fill_voids(holed)
+    >>> bool(abs(filled.values - z).max() < 0.2)
+    True
+    >>> filled.cells_filled
+    6
+    """
+    options = _options(options, parameters)
+    values, void = _checked(values, void)
+    voids = find_voids(void)
+    if voids.cells.sum() == void.size:
+        raise InputError("every cell is a void; there is nothing to fill from")
+    work, out = _working_array(values, out, options)
+    rims = survey_rims(work, voids)
+    selected = _selected(voids, rims, options)
+    fill = _fill_relaxed if options.variant == "relaxed" else _fill_by_passes
+    fill(
+        work, values, void, voids, rims, selected, options,
+        lattice=lattice or Lattice.covering(values.shape), pixel_size=pixel_size, d_max=d_max,
+        threads=threads, progress=progress,
+    )  # fmt: skip
+    if work is not out:
+        _copy_cells(work, voids, selected, out)
+    return Filled(out, voids, rims, selected)
+
+
+def _options(options, parameters):
+    if options is None:
+        try:
+            options = FillOptions(**parameters)
+        except TypeError as error:
+            raise InputError(str(error).replace("FillOptions.__init__()", "fill_voids")) from None
+    elif parameters:
+        raise InputError(f"give options or {', '.join(parameters)}, not both")
+    validate(options)
+    if options.variant == "relaxed" and (options.l or options.l_bu):
+        raise InputError(
+            "l and l_bu bend the variants 'weighted' and 'paper'; 'relaxed' has no such curve"
+        )
+    return options
+
+
+def _checked(values, void):
+    values = np.asanyarray(values)
+    if values.ndim != 2 or 0 in values.shape:
+        raise InputError(f"values has shape {values.shape}; give a 2-D array of elevations")
+    if values.dtype.kind not in "iuf":
+        raise InputError(f"values is of type {values.dtype}; give integers or real numbers")
+    if void is None:
+        void = ~np.isfinite(values) if values.dtype.kind == "f" else np.zeros(values.shape, bool)
+    void = np.asanyarray(void)
+    if void.shape != values.shape:
+        raise InputError(f"void has shape {void.shape}, values {values.shape}")
+    return values, np.ascontiguousarray(void.astype(bool, copy=False))
+
+
+def _working_array(values, out, options):
+    """Give the float array to work in and the array to return, the same where possible."""
+    dtype = values.dtype
+    if options.float_output and dtype.kind != "f":
+        dtype = _float_type(dtype)
+    if out is None:
+        out = np.empty(values.shape, dtype)
+    elif out.shape != values.shape or out.dtype != dtype:
+        raise InputError(f"out is {out.dtype} {out.shape}; it must be {dtype} {values.shape}")
+    if out is not values:
+        np.copyto(out, values, casting="unsafe")
+    if dtype.kind == "f" and dtype.itemsize in (4, 8) and out.flags.c_contiguous:
+        return out, out
+    return np.ascontiguousarray(values, _float_type(values.dtype)), out
+
+
+def _float_type(dtype):
+    """Give the float type that holds every number of a type, or nearly."""
+    small = dtype.itemsize <= 2 or dtype == np.float32
+    return np.dtype(np.float32 if small else np.float64)
+
+
+def _selected(voids, rims, options):
+    wanted = np.ones(len(voids), bool)
+    if options.interior_only:
+        wanted &= ~rims.touches_edge
+    if options.max_size is not None:
+        wanted &= voids.cells <= options.max_size
+    return np.flatnonzero(wanted)
+
+
+def _fill_relaxed(
+    work, values, void, voids, rims, selected, options, *, lattice, pixel_size, d_max, threads,
+    progress,
+):  # fmt: skip
+    # d_max belongs to the curves, which this variant does not have.
+    relax_voids(
+        work, voids, selected, rims.mean[selected], pixel_size=pixel_size,
+        tension=options.tension, displacement=_displacement(values, void, lattice, options),
+        lattice=lattice, threads=threads, progress=progress,
+    )  # fmt: skip
+
+
+def _fill_by_passes(
+    work, values, void, voids, rims, selected, options, *, lattice, pixel_size, d_max, threads,
+    progress,
+):  # fmt: skip
+    filled = interpolate(
+        values, ~void, variant=options.variant, scheme=options.scheme, l=options.l,
+        l_bu=options.l_bu, datum=options.datum, d_max=d_max,
+        displacement=_displacement(values, void, lattice, options), pixel_size=pixel_size,
+        lattice=lattice, threads=threads, progress=progress,
+    )  # fmt: skip
+    _copy_cells(filled, voids, selected, work)
+
+
+def _displacement(values, void, lattice, options):
+    if options.r_s == 0:
+        return None
+    relief = options.relief
+    if relief is None:
+        known = ~void
+        relief = float(values.max(where=known, initial=-np.inf)) - float(
+            values.min(where=known, initial=np.inf)
+        )
+    return Displacement(options.r_s * relief, options.h, options.r_t, options.seed, lattice.levels)
+
+
+def _copy_cells(source, voids, selected, target):
+    """Copy the selected voids' cells, rounded and cut to the range of the target's type."""
+    chosen = np.zeros(len(voids) + 1, bool)
+    chosen[selected + 1] = True
+    whole = target.dtype.kind in "iu"
+    limits = np.iinfo(target.dtype) if whole else np.finfo(target.dtype)
+    step = max(1, _BLOCK_CELLS // target.shape[1])
+    for row in range(0, target.shape[0], step):
+        rows = slice(row, row + step)
+        block = np.clip(source[rows], float(limits.min), float(limits.max))
+        if whole:
+            np.rint(block, out=block)
+        np.copyto(target[rows], block, where=chosen[voids.labels[rows]], casting="unsafe")

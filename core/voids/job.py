@@ -1,0 +1,209 @@
+"""Void filling from file to file, as the command line and QGIS do it."""
+
+import contextlib
+import json
+import os
+import time
+from dataclasses import asdict, dataclass, fields, replace
+
+import demsmith
+from demsmith.core import raster
+from demsmith.core.errors import InputError
+from demsmith.core.options import validate
+from demsmith.core.progress import SILENT, Span, checkpoint
+from demsmith.core.voids.filling import FILLED, LEFT, ORIGINAL, fill_voids
+from demsmith.core.voids.options import FillOptions
+from demsmith.core.voids.table import VoidTable, tabulate
+
+_SOURCE_COLORS = {
+    ORIGINAL: (225, 225, 225, 255),
+    FILLED: (214, 39, 40, 255),
+    LEFT: (0, 0, 0, 255),
+}
+_SOURCE_NAMES = ("original", "filled", "void left as it was")
+
+
+@dataclass(frozen=True)
+class FillResult:
+    """What a fill did.
+
+    Attributes
+    ----------
+    output, source_map, report : str or None
+        Paths of what was written.
+    seconds : float
+    version : str
+        Demsmith's.
+    voids, cells, cells_void, cells_filled, cells_unfilled, largest_void : int
+        Number of voids found, of cells in all, in voids, filled and left, and of cells of the
+        largest void.
+    warnings : tuple of str
+        One sentence each.
+    table : VoidTable
+    """
+
+    output: str
+    source_map: str | None
+    report: str | None
+    seconds: float
+    version: str
+    voids: int
+    cells: int
+    cells_void: int
+    cells_filled: int
+    cells_unfilled: int
+    largest_void: int
+    warnings: tuple
+    table: VoidTable
+
+    def as_dict(self):
+        """Give everything but the table as a dict that JSON can hold."""
+        return {
+            field.name: getattr(self, field.name)
+            for field in fields(self)
+            if field.name != "table"
+        }
+
+
+def fill_file(
+    input, output, *, options=None, band=1, nodata=(), below=None, above=None, mask=None,  # noqa: A002
+    source_map=None, report=None, threads=None, overwrite=False, creation_options=(),
+    progress=SILENT,
+):  # fmt: skip
+    """Fill the voids of a raster file.
+
+    Everything asked for is written, or nothing is; the input is never changed.
+
+    Parameters
+    ----------
+    input : path
+        Anything `demsmith.read_raster` reads, which also explains ``band``, ``nodata``,
+        ``below``, ``above`` and ``mask``.
+    output : path
+        GeoTIFF with the voids filled, in the input's data type unless
+        ``options.float_output``.
+    options : FillOptions, optional
+    source_map : path, optional
+        GeoTIFF of bytes: 0 original, 1 filled, 2 a void left as it was.
+    report : path, optional
+        JSON file with the result, the options and the table of voids.
+    threads : int, optional
+        Default: one for each core. The outputs do not depend on it.
+    overwrite : bool
+        Whether existing outputs may be replaced.
+    creation_options : iterable of str
+        GDAL's for GeoTIFF, ``KEY=VALUE``.
+    progress : Progress
+
+    Returns
+    -------
+    FillResult
+
+    Raises
+    ------
+    InputError
+        If the input cannot be used, has nothing but voids, or an option is out of range.
+    OutputError
+        If an output cannot be written.
+    Cancelled
+        If ``progress`` asks to stop.
+    """
+    begin = time.perf_counter()
+    options = options or FillOptions()
+    validate(options)
+    paths = _checked_outputs(input, mask, output, source_map, report, overwrite)
+    source = raster.read(
+        input, band=band, nodata=nodata, below=below, above=above, mask=mask,
+        progress=Span(progress, 0, 0.15),
+    )  # fmt: skip
+    filled = _fill(source, options, threads, Span(progress, 0.15, 0.8))
+    result = _result(source, filled, paths, begin)
+    writing = dict(
+        like=source, threads=threads, overwrite=True, creation_options=creation_options
+    )
+    with contextlib.ExitStack() as all_or_nothing:
+        part = {
+            name: all_or_nothing.enter_context(raster.whole_or_nothing(path))
+            for name, path in paths.items()
+            if path
+        }
+        raster.write(
+            part["output"], filled.values, void=filled.left(), dtype=filled.values.dtype,
+            progress=Span(progress, 0.8, 0.95), **writing,
+        )  # fmt: skip
+        if source_map:
+            raster.write(
+                part["source_map"], filled.source(), dtype="uint8", nodata=None,
+                description="source", same_quantity=False, color_table=_SOURCE_COLORS,
+                categories=_SOURCE_NAMES, progress=Span(progress, 0.95, 1), **writing,
+            )  # fmt: skip
+        result = replace(result, seconds=round(time.perf_counter() - begin, 3))
+        if report:
+            _write_report(part["report"], result, options, input, band)
+        checkpoint(progress, 1.0)
+    return result
+
+
+def _checked_outputs(source, mask, output, source_map, report, overwrite):
+    inputs = [path for path in (source, mask) if path is not None]
+    raster.check_output(output, inputs=inputs, overwrite=overwrite)
+    if source_map:
+        raster.check_output(source_map, inputs=inputs, overwrite=overwrite)
+    if report:
+        raster.check_place(report, inputs=inputs, overwrite=overwrite)
+    paths = {"output": output, "source_map": source_map, "report": report}
+    paths = {name: os.fspath(path) if path else None for name, path in paths.items()}
+    named = [os.path.realpath(path) for path in paths.values() if path]
+    if len(set(named)) < len(named):
+        raise InputError("output, source map and report must be different files")
+    return paths
+
+
+def _fill(source, options, threads, progress):
+    meta = source.meta
+    # The options speak of real elevations, the cells of stored ones.
+    stored = replace(
+        options,
+        datum=None if options.datum is None else (options.datum - meta.offset) / meta.scale,
+        relief=None if options.relief is None else options.relief / abs(meta.scale),
+    )
+    try:
+        return fill_voids(
+            source.values, source.void, options=stored, pixel_size=source.grid.pixel_size_m(),
+            threads=threads, progress=progress,
+        )  # fmt: skip
+    except InputError as error:
+        raise InputError(f"'{source.source}': {error}") from None
+
+
+def _result(source, filled, paths, begin):
+    cells = filled.voids.cells
+    warnings = list(source.notes)
+    if not cells.size:
+        warnings.append(f"'{source.source}' has no voids; its elevations are written as they are")
+    return FillResult(
+        **paths,
+        seconds=time.perf_counter() - begin,
+        version=demsmith.__version__,
+        voids=len(cells),
+        cells=source.values.size,
+        cells_void=int(cells.sum()),
+        cells_filled=filled.cells_filled,
+        cells_unfilled=int(cells.sum()) - filled.cells_filled,
+        largest_void=int(cells.max(initial=0)),
+        warnings=tuple(warnings),
+        table=tabulate(filled, source.grid, source.meta),
+    )
+
+
+def _write_report(path, result, options, source, band):
+    content = {
+        **result.as_dict(),
+        "input": os.fspath(source),
+        "band": band,
+        "options": asdict(options),
+        "void_table": list(result.table.rows()),
+    }
+    with open(path, "w", encoding="utf-8") as file:
+        json.dump(content, file, indent=1, allow_nan=False)
+        file.write("\n")

@@ -1,0 +1,34 @@
+"""The options of void filling."""
+
+from dataclasses import dataclass
+
+from demsmith.core.mcmd.options import McmdOptions
+from demsmith.core.options import option
+
+
+@dataclass(frozen=True, kw_only=True)
+class FillOptions(McmdOptions):
+    """How voids are filled, and which of them.
+
+    See `demsmith.core.mcmd.McmdOptions` for the options of MCMD itself.
+    """
+
+    method: str = option(
+        str, "mcmd", "Method",
+        "mcmd: constrained midpoint displacement (Belhadj 2007), every generation relaxed.",
+        choices=("mcmd",),
+    )  # fmt: skip
+    interior_only: bool = option(
+        bool, False, "Fill interior voids only",
+        "Leave voids that touch the raster's edge as they are.",
+    )  # fmt: skip
+    max_size: int = option(
+        int, None, "Largest void to fill [cells]",
+        "Leave voids of more cells than this as they are; not given: fill every void.",
+        minimum=1,
+    )  # fmt: skip
+    float_output: bool = option(
+        bool, False, "Write floating-point elevations",
+        "Write Float32 instead of the input's data type, so that filled ground is not rounded.",
+        flag="float",
+    )  # fmt: skip
