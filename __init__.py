@@ -22,7 +22,7 @@ def __getattr__(name):
         from importlib import import_module
 
         return getattr(import_module(_PUBLIC[name]), name)
-    raise AttributeError("module 'demsmith' has no attribute '{}'".format(name))
+    raise AttributeError(f"module 'demsmith' has no attribute '{name}'")
 
 
 def __dir__():

@@ -93,10 +93,8 @@ def accuracy():
             ),
         }
         for label, options in VARIANTS.items():
-            methods["Demsmith " + label] = (
-                lambda z, void, options=options, pixel_size=pixel_size: demsmith.fill_voids(
-                    z, void, pixel_size=pixel_size, **options
-                ).values
+            methods["Demsmith " + label] = lambda z, void, options=options, pixel_size=pixel_size: (
+                demsmith.fill_voids(z, void, pixel_size=pixel_size, **options).values
             )
         masks = [punch_voids(truth, seed=seed) for seed in SEEDS]
         rmse = {label: pooled(method, truth, masks) for label, method in methods.items()}
@@ -150,7 +148,7 @@ def speed():
         "",
         "GDAL fills in place; so does *in place*. *Copy* returns a new array.",
         "",
-        "| raster | GDAL | in place, 2 threads | GDAL ÷ it | copy, 2 threads | in place, 1 thread |",
+        "| raster | GDAL | in place, 2 threads | GDAL ÷ it | copy, 2 threads | in place, 1 |",
         "|---|---|---|---|---|---|",
     ]
     cases = {name: tiles.void_free(name) for name in tiles.VOID_FREE}
@@ -248,7 +246,7 @@ def raw_tiles():
     lines = [
         "### Raw tiles",
         "",
-        "| tile | voids | void cells | largest | unfilled | known cells changed | type, place kept | s |",
+        "| tile | voids | void cells | largest | unfilled | known changed | type, place kept | s |",
         "|---|---|---|---|---|---|---|---|",
     ]
     with tempfile.TemporaryDirectory() as folder:

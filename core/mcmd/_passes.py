@@ -111,7 +111,7 @@ def lift_level(z, known, step, centres, begin, end, triangle, l_bu, d_max, dx, d
             for di in range(-1, 2):
                 for dj in range(-1, 2):
                     diagonal = di != 0 and dj != 0
-                    if (di == 0 and dj == 0) or (diagonal and (centres or triangle and di != dj)):
+                    if (di == 0 and dj == 0) or (diagonal and (centres or (triangle and di != dj))):
                         continue
                     ci, cj = i + di * step, j + dj * step
                     if ci < 0 or cj < 0 or ci >= side or cj >= side or not known[ci, cj]:

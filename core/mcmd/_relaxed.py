@@ -62,6 +62,8 @@ def fill_voids(
             count = gather(
                 labels, runs, a, b, void + 1, level, row_offset, column_offset, points, rows, usable
             )
+            if level:
+                count = pin(values, labels, points, rows, usable, count, level)
             if count:
                 predict(values, points, usable, count, level)
                 sweeps = fine << level
@@ -145,18 +147,29 @@ def gather(labels, runs, a, b, own, level, row_offset, column_offset, points, ro
     """List the void's own lattice points of a level, each with what is known of its stencil."""
     step = 1 << level
     height, width = labels.shape
-    alone = _alone(labels, runs, a, b, own, step, row_offset, column_offset)
     count = 0
     for k in range(a, b):
         row, start, stop = runs[k]
-        if (row + row_offset) % step:
+        # A step is a power of two, and masking is many times as fast as dividing.
+        if (row + row_offset) & (step - 1):
+            continue
+        start += -(start + column_offset) & (step - 1)
+        if start >= stop:
             continue
         row_class = _ROW_ODD if (row + row_offset) & step else 0
-        start += -(start + column_offset) % step
+        near_edge = row < 2 * step or row + 2 * step >= height
+        near_edge |= start < 2 * step or stop + 2 * step > width
+        alone = not near_edge and _alone(labels, row, start, stop, own, step)
         for column in range(start, stop, step):
             rows[count] = row
-            points[count] = np.uint64(row) * np.uint64(width) + np.uint64(column)
-            bits = _ALL if alone else _usable(labels, row, column, own, step, height, width)
+            p = np.uint64(row) * np.uint64(width) + np.uint64(column)
+            points[count] = p
+            if alone:
+                bits = _ALL
+            elif near_edge:
+                bits = _usable_near_edge(labels, row, column, own, step)
+            else:
+                bits = _usable(labels.ravel(), p, own, np.uint64(step), np.uint64(width))
             if (column + column_offset) & step:
                 bits |= _COLUMN_ODD
             usable[count] = bits | row_class
@@ -165,61 +178,103 @@ def gather(labels, runs, a, b, own, level, row_offset, column_offset, points, ro
 
 
 @numba.njit(**_JIT)
-def _alone(labels, runs, a, b, own, step, row_offset, column_offset):
-    """Tell whether no stencil of the void can reach another void or the raster's edge."""
-    height, width = labels.shape
-    low, high = columns(runs, a, b)
-    top, bottom = runs[a, 0] - 2 * step, runs[b - 1, 0] + 2 * step + 1
-    left, right = low - 2 * step, high + 2 * step
-    if top < 0 or left < 0 or bottom > height or right > width:
-        return False
-    top += -(top + row_offset) % step
-    left += -(left + column_offset) % step
-    for row in range(top, bottom, step):
-        found = False
-        for column in range(left, right, step):
-            label = labels[row, column]
+def _alone(labels, row, start, stop, own, step):
+    """Tell whether no stencil of a run's points meets another void."""
+    flat = labels.ravel()
+    width, side = np.uint64(labels.shape[1]), np.uint64(step)
+    found = False
+    for r in range(row - 2 * step, row + 2 * step + 1, step):
+        p = np.uint64(r) * width + np.uint64(start - 2 * step)
+        end = p + np.uint64(stop - start + 4 * step)
+        while p < end:
+            label = flat[p]
             found |= (label != 0) & (label != own)
-        if found:
-            return False
-    return True
+            p += side
+    return not found
 
 
 @numba.njit(**_JIT)
-def _usable(labels, row, column, own, step, height, width):
-    bits = 0
+def _usable(flat, p, own, side, width):
+    """Give the bits of the neighbours that are known or the void's own."""
+    up = side * width
+    bits = _open(flat[p - side], own) * _WEST
+    bits |= _open(flat[p + side], own) * _EAST
+    bits |= _open(flat[p - up], own) * _NORTH
+    bits |= _open(flat[p + up], own) * _SOUTH
+    bits |= _open(flat[p - side - side], own) * _WEST2
+    bits |= _open(flat[p + side + side], own) * _EAST2
+    bits |= _open(flat[p - up - up], own) * _NORTH2
+    bits |= _open(flat[p + up + up], own) * _SOUTH2
+    bits |= _open(flat[p - up - side], own) * _NORTHWEST
+    bits |= _open(flat[p - up + side], own) * _NORTHEAST
+    bits |= _open(flat[p + up - side], own) * _SOUTHWEST
+    bits |= _open(flat[p + up + side], own) * _SOUTHEAST
+    return bits
+
+
+@numba.njit(inline="always", **_JIT)
+def _open(label, own):
+    return np.int64((label == 0) | (label == own))
+
+
+@numba.njit(**_JIT)
+def _usable_near_edge(labels, row, column, own, step):
+    """Do the same where some neighbours lie beyond the raster."""
+    height, width = labels.shape
     far = 2 * step
-    if row >= far and column >= far and row + far < height and column + far < width:
-        bits = _ALL
-        if _other(labels[row, column - step], own): bits -= _WEST
-        if _other(labels[row, column + step], own): bits -= _EAST
-        if _other(labels[row - step, column], own): bits -= _NORTH
-        if _other(labels[row + step, column], own): bits -= _SOUTH
-        if _other(labels[row, column - far], own): bits -= _WEST2
-        if _other(labels[row, column + far], own): bits -= _EAST2
-        if _other(labels[row - far, column], own): bits -= _NORTH2
-        if _other(labels[row + far, column], own): bits -= _SOUTH2
-        if _other(labels[row - step, column - step], own): bits -= _NORTHWEST
-        if _other(labels[row - step, column + step], own): bits -= _NORTHEAST
-        if _other(labels[row + step, column - step], own): bits -= _SOUTHWEST
-        if _other(labels[row + step, column + step], own): bits -= _SOUTHEAST
-        return bits
-    bit = 1
+    bits, bit = 0, 1
     for dr, dc in (
         (0, -step), (0, step), (-step, 0), (step, 0),
         (0, -far), (0, far), (-far, 0), (far, 0),
         (-step, -step), (-step, step), (step, -step), (step, step),
     ):  # fmt: skip
         r, c = row + dr, column + dc
-        if 0 <= r < height and 0 <= c < width and not _other(labels[r, c], own):
-            bits |= bit
+        if 0 <= r < height and 0 <= c < width:
+            bits |= _open(labels[r, c], own) * bit
         bit *= 2
     return bits
 
 
-@numba.njit(inline="always", **_JIT)
-def _other(label, own):
-    return label != 0 and label != own
+@numba.njit(**_JIT)
+def pin(values, labels, points, rows, usable, count, level):
+    """Set points near known ground that no stencil of this level meets, and drop them.
+
+    Ground narrower than the step, such as an island in the void or a strip at the raster's edge,
+    would else be met at the finest level only, whose few sweeps would leave a spike there. As in
+    the bottom-up pass the points take its elevation: the mean of the known cells up to half a step
+    away, by inverse squared distance. Returns how many points are left.
+    """
+    height, width = labels.shape
+    half = 1 << (level - 1)
+    kept = 0
+    for i in range(count):
+        row = np.int64(rows[i])
+        column = np.int64(points[i]) - row * width
+        total, weight = 0.0, 0.0
+        if not _known_beside(labels, row, column, 1 << level):
+            for r in range(max(row - half, 0), min(row + half + 1, height)):
+                for c in range(max(column - half, 0), min(column + half + 1, width)):
+                    if labels[r, c] == 0:
+                        near = 1.0 / ((r - row) ** 2 + (c - column) ** 2)
+                        total += near * values[r, c]
+                        weight += near
+        if weight > 0:
+            values[row, column] = total / weight
+        else:
+            points[kept], rows[kept], usable[kept] = points[i], rows[i], usable[i]
+            kept += 1
+    return kept
+
+
+@numba.njit(**_JIT)
+def _known_beside(labels, row, column, step):
+    """Tell whether one of a lattice point's eight neighbours is known."""
+    height, width = labels.shape
+    for r in range(row - step, row + step + 1, step):
+        for c in range(column - step, column + step + 1, step):
+            if 0 <= r < height and 0 <= c < width and labels[r, c] == 0:
+                return True
+    return False
 
 
 @numba.njit(**_JIT)

@@ -61,7 +61,7 @@ def metres(shape, pixel_size):
     from demsmith.core.errors import InputError
 
     sizes = 1.0 if pixel_size is None else pixel_size
-    pair = (sizes, sizes) if np.ndim(sizes) == 0 else tuple(sizes)
+    pair = tuple(sizes) if np.iterable(sizes) else (sizes, sizes)
     if len(pair) != 2:
         raise InputError(f"pixel_size has {len(pair)} parts; give (east-west, north-south)")
     out = []

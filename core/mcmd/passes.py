@@ -153,7 +153,7 @@ class _Passes:
         active = points_of(self.known)
         generation = 0
         while active.size:
-            checkpoint(progress, generation / (generation + self.lattice.levels))
+            checkpoint(progress, generation / (generation + self.lattice.levels + 1))
             active = bottom_up_generation(
                 self.z, self.known, active, sums, counts, self.triangle, l_bu, self.d_max,
                 self.dx, self.dy,
@@ -164,10 +164,11 @@ class _Passes:
         from demsmith.core.mcmd._passes import lift_level
 
         for level in range(self.lattice.levels):
-            part = Span(progress, level / self.lattice.levels, (level + 1) / self.lattice.levels)
-            for centres in (False,) if self.triangle else (True, False):
+            # Each level has a quarter of the finer one's work, so it ends at 1 - 1/4, 1 - 1/16, ...
+            part = Span(progress, 1 - 0.25**level, 1 - 0.25 ** (level + 1))
+            for centres, half in ((False, part),) if self.triangle else _halves(part):
                 self._over_rows(
-                    lift_level, level, centres, part, self.triangle, l_bu, self.d_max,
+                    lift_level, level, centres, half, self.triangle, l_bu, self.d_max,
                     self.dx, self.dy,
                 )  # fmt: skip
 
@@ -190,10 +191,10 @@ class _Passes:
             amplitude = displacement.by_level()
             shift, seed = displacement.r_t, displacement.seed
         for level in range(self.lattice.levels - 1, -1, -1):
-            part = Span(progress, 1 - 0.25**level, 1 - 0.25 ** (level + 1))
-            for centres in (True, False):
+            part = Span(progress, 0.25 ** (level + 1), 0.25**level)
+            for centres, half in _halves(part):
                 self._over_rows(
-                    descend_level, level, centres, part, self.triangle, l, self.d_max,
+                    descend_level, level, centres, half, self.triangle, l, self.d_max,
                     self.dx, self.dy, amplitude[level], shift, seed,
                 )  # fmt: skip
 
@@ -214,3 +215,8 @@ class _Passes:
             threads=self.threads,
             progress=progress,
         )
+
+
+def _halves(progress):
+    """Give the centres' part of a level's progress, then that of the other midpoints."""
+    return (True, Span(progress, 0, 1 / 3)), (False, Span(progress, 1 / 3, 1))

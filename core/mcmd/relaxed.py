@@ -77,16 +77,18 @@ def relax_voids(
 
     cells = voids.cells[selected]
     large = cells > _LARGE
+    relaxing = progress if displacement is None else Span(progress, 0, 0.7)
     share = float(cells[large].sum() / cells.sum())
     _fill_large(
-        values, voids, selected[large], starts[large], stencils, offsets, Span(progress, 0, share)
+        values, voids, selected[large], starts[large], stencils, offsets, Span(relaxing, 0, share)
     )
     _fill_small(
         values, voids, selected[~large], starts[~large], stencils, offsets,
-        threads, Span(progress, share, 1),
+        threads, Span(relaxing, share, 1),
     )  # fmt: skip
     if displacement is not None:
-        _displace(values, voids, selected, displacement, offsets, threads, progress)
+        rest = Span(progress, 0.7, 1)
+        _displace(values, voids, selected, displacement, offsets, threads, rest)
 
 
 def _fill_small(values, voids, selected, starts, stencils, offsets, threads, progress):
@@ -136,6 +138,8 @@ def _fill_one(values, voids, void, start, stencils, offsets, progress):
         count = kernels.gather(
             voids.labels, voids.runs, a, b, void + 1, level, *offsets, points, rows, usable
         )
+        if level:
+            count = kernels.pin(values, voids.labels, points, rows, usable, count, level)
         if count:
             kernels.predict(values, points, usable, count, level)
         sweeps = FINEST_SWEEPS << level
@@ -148,7 +152,7 @@ def _fill_one(values, voids, void, start, stencils, offsets, progress):
                 kernels.relax(
                     values, points, rows, usable, low, high, level, stencils, OMEGA, sweep, last
                 )
-                checkpoint(progress, done + 0.5 ** (level + 1) * sweep / sweeps)
+                checkpoint(progress, done + 0.5 ** (level + 1) * last / sweeps)
         done += 0.5 ** (level + 1)
 
 

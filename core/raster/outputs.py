@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 import shutil
 import tempfile
 
@@ -11,6 +12,7 @@ from demsmith.core.raster.opening import files_of
 _EXTENSIONS = (".tif", ".tiff")
 # Files that GDAL reads along with a GeoTIFF; those of an overwritten one would speak of the old.
 _SIDECARS = (".aux.xml", ".ovr", ".msk", ".msk.ovr")
+_WORKSHOP = ".demsmith-"
 
 
 def check_output(path, *, inputs=(), overwrite=False):
@@ -85,9 +87,9 @@ def whole_or_nothing(path):
     """
     folder, name = os.path.split(os.path.abspath(path))
     try:
-        workshop = tempfile.mkdtemp(prefix=".demsmith-", dir=folder)
+        workshop = tempfile.mkdtemp(prefix=_WORKSHOP, dir=folder)
     except OSError as error:
-        raise OutputError(f"cannot write '{path}': {error.strerror}") from None
+        raise cannot_write(path, error.strerror) from None
     try:
         yield os.path.join(workshop, name)
         made = sorted(os.listdir(workshop), key=lambda other: other == name)  # the raster last
@@ -98,9 +100,15 @@ def whole_or_nothing(path):
                 if name + suffix not in made:
                     _remove(os.path.join(folder, name + suffix))
         except OSError as error:
-            raise OutputError(f"cannot write '{path}': {error.strerror}") from None
+            raise cannot_write(path, error.strerror) from None
     finally:
         shutil.rmtree(workshop, ignore_errors=True)
+
+
+def cannot_write(path, reason):
+    """Make the `OutputError` of a path, without the folders of unfinished work in it."""
+    message = f"cannot write '{path}': {reason}"
+    return OutputError(re.sub(re.escape(_WORKSHOP) + r"\w+[/\\]", "", message))
 
 
 def _remove(path):

@@ -10,7 +10,7 @@ from demsmith.core.progress import SILENT, checkpoint
 from demsmith.core.raster._gdal import gdal_type, load, session
 from demsmith.core.raster.creation import creation_options as complete_options
 from demsmith.core.raster.nodata import as_stored
-from demsmith.core.raster.outputs import check_output, whole_or_nothing
+from demsmith.core.raster.outputs import cannot_write, check_output, whole_or_nothing
 from demsmith.core.raster.raster import BandMeta
 
 SAME = object()
@@ -97,7 +97,7 @@ def write(
             _write_dataset(unfinished, blocks, tag, like.grid, meta, options, heard, progress)
             # The closed dataset has written its last bytes: now a full disk is known.
             if heard.failures:
-                raise OutputError(f"cannot write '{path}': {heard.reason}")
+                raise cannot_write(path, heard.reason)
         checkpoint(progress, 1.0)
     return Written(path, tag)
 
@@ -233,7 +233,7 @@ def _write_dataset(path, blocks, tag, grid, meta, options, heard, progress):
                 band.WriteRaster, 0, strip.start, columns, block.shape[0], block,
                 columns, block.shape[0], kind,
             )  # fmt: skip
-            # Flushing now puts the tiles into the file in one order, whatever GDAL's cache holds.
+            # Compress now, where cancelling is heard, and not everything on closing.
             heard.attempt(band.FlushCache)
             if heard.failures:
                 return

@@ -120,14 +120,17 @@ def paint(runs, first_run, labels):
 
 
 @numba.njit(**_JIT)
-def survey(values, labels, runs, first_run, low, mean, high, touches_edge):
-    """Give the lowest, mean and highest known cell beside each void, NaN where there is none."""
+def survey(values, void, runs, first_run, begin, end, low, mean, high, touches_edge):
+    """Give the lowest, mean and highest known cell beside the voids ``begin`` to ``end``.
+
+    NaN where there is none. A void cell beside a void's own is its own too.
+    """
     height, width = values.shape
-    for void in range(low.size):
+    for number in range(begin, end):
         lowest, highest = np.inf, -np.inf
         total, count = 0.0, 0
         edge = False
-        for k in range(first_run[void], first_run[void + 1]):
+        for k in range(first_run[number], first_run[number + 1]):
             row, start, stop = runs[k]
             edge |= row == 0 or row == height - 1 or start == 0 or stop == width
             for other in range(row - 1, row + 2):
@@ -137,13 +140,13 @@ def survey(values, labels, runs, first_run, low, mean, high, touches_edge):
                 left = start - 1 if other == row else start
                 right = stop + 1 if other == row else stop
                 for column in range(max(left, 0), min(right, width)):
-                    if labels[other, column] == 0:
+                    if not void[other, column]:
                         value = values[other, column]
                         lowest = min(lowest, value)
                         highest = max(highest, value)
                         total += value
                         count += 1
-        touches_edge[void] = edge
-        low[void] = lowest if count else np.nan
-        high[void] = highest if count else np.nan
-        mean[void] = total / count if count else np.nan
+        touches_edge[number] = edge
+        low[number] = lowest if count else np.nan
+        high[number] = highest if count else np.nan
+        mean[number] = total / count if count else np.nan

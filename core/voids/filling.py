@@ -7,7 +7,7 @@ import numpy as np
 from demsmith.core.errors import InputError
 from demsmith.core.mcmd import Displacement, Lattice, interpolate, relax_voids
 from demsmith.core.options import validate
-from demsmith.core.progress import SILENT
+from demsmith.core.progress import SILENT, Span
 from demsmith.core.voids.labelling import Rims, Voids, find_voids, survey_rims
 from demsmith.core.voids.options import FillOptions
 
@@ -83,7 +83,7 @@ def fill_voids(
     values : (H, W) array of a real or integer type
         Elevations [m].
     void : (H, W) bool array, optional
-        True where there is no elevation. Default: where ``values`` is not finite.
+        True where there is no elevation. Default: where ``values`` is masked or not finite.
     options : FillOptions, optional
         How to fill; its fields can as well be given as keywords of their own.
     pixel_size : float, (float, float) or (array, array), optional
@@ -126,17 +126,17 @@ def fill_voids(
     """
     options = _options(options, parameters)
     values, void = _checked(values, void)
-    voids = find_voids(void)
+    voids = find_voids(void, progress=Span(progress, 0, 0.1))
     if voids.cells.sum() == void.size:
         raise InputError("every cell is a void; there is nothing to fill from")
     work, out = _working_array(values, out, options)
-    rims = survey_rims(work, voids)
+    rims = survey_rims(work, void, voids, threads=threads, progress=Span(progress, 0.1, 0.2))
     selected = _selected(voids, rims, options)
     fill = _fill_relaxed if options.variant == "relaxed" else _fill_by_passes
     fill(
         work, values, void, voids, rims, selected, options,
         lattice=lattice or Lattice.covering(values.shape), pixel_size=pixel_size, d_max=d_max,
-        threads=threads, progress=progress,
+        threads=threads, progress=Span(progress, 0.2, 1),
     )  # fmt: skip
     if work is not out:
         _copy_cells(work, voids, selected, out)
@@ -160,14 +160,16 @@ def _options(options, parameters):
 
 
 def _checked(values, void):
-    values = np.asanyarray(values)
+    masked = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else False
+    values = np.asarray(values)
     if values.ndim != 2 or 0 in values.shape:
         raise InputError(f"values has shape {values.shape}; give a 2-D array of elevations")
     if values.dtype.kind not in "iuf":
         raise InputError(f"values is of type {values.dtype}; give integers or real numbers")
     if void is None:
         void = ~np.isfinite(values) if values.dtype.kind == "f" else np.zeros(values.shape, bool)
-    void = np.asanyarray(void)
+        void |= masked
+    void = np.asarray(void)
     if void.shape != values.shape:
         raise InputError(f"void has shape {void.shape}, values {values.shape}")
     return values, np.ascontiguousarray(void.astype(bool, copy=False))
@@ -184,14 +186,14 @@ def _working_array(values, out, options):
         raise InputError(f"out is {out.dtype} {out.shape}; it must be {dtype} {values.shape}")
     if out is not values:
         np.copyto(out, values, casting="unsafe")
-    if dtype.kind == "f" and dtype.itemsize in (4, 8) and out.flags.c_contiguous:
+    if dtype in (np.float32, np.float64) and out.flags.c_contiguous:  # in native byte order
         return out, out
-    return np.ascontiguousarray(values, _float_type(values.dtype)), out
+    return np.array(values, _float_type(values.dtype), order="C"), out
 
 
 def _float_type(dtype):
     """Give the float type that holds every number of a type, or nearly."""
-    small = dtype.itemsize <= 2 or dtype == np.float32
+    small = dtype.itemsize <= 2 or dtype.newbyteorder("=") == np.float32
     return np.dtype(np.float32 if small else np.float64)
 
 
@@ -234,10 +236,8 @@ def _displacement(values, void, lattice, options):
         return None
     relief = options.relief
     if relief is None:
-        known = ~void
-        relief = float(values.max(where=known, initial=-np.inf)) - float(
-            values.min(where=known, initial=np.inf)
-        )
+        known = values[~void]
+        relief = float(known.max()) - float(known.min())
     return Displacement(options.r_s * relief, options.h, options.r_t, options.seed, lattice.levels)
 
 

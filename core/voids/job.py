@@ -16,8 +16,8 @@ from demsmith.core.voids.options import FillOptions
 from demsmith.core.voids.table import VoidTable, tabulate
 
 _SOURCE_COLORS = {
-    ORIGINAL: (225, 225, 225, 255),
-    FILLED: (214, 39, 40, 255),
+    ORIGINAL: (217, 217, 217, 255),
+    FILLED: (214, 24, 111, 255),
     LEFT: (0, 0, 0, 255),
 }
 _SOURCE_NAMES = ("original", "filled", "void left as it was")
@@ -59,9 +59,7 @@ class FillResult:
     def as_dict(self):
         """Give everything but the table as a dict that JSON can hold."""
         return {
-            field.name: getattr(self, field.name)
-            for field in fields(self)
-            if field.name != "table"
+            field.name: getattr(self, field.name) for field in fields(self) if field.name != "table"
         }
 
 
@@ -118,9 +116,10 @@ def fill_file(
     )  # fmt: skip
     filled = _fill(source, options, threads, Span(progress, 0.15, 0.8))
     result = _result(source, filled, paths, begin)
-    writing = dict(
-        like=source, threads=threads, overwrite=True, creation_options=creation_options
-    )
+    checkpoint(progress, 0.8)
+    left = filled.left()
+    checkpoint(progress, 0.8)
+    writing = dict(like=source, threads=threads, overwrite=True, creation_options=creation_options)
     with contextlib.ExitStack() as all_or_nothing:
         part = {
             name: all_or_nothing.enter_context(raster.whole_or_nothing(path))
@@ -128,7 +127,7 @@ def fill_file(
             if path
         }
         raster.write(
-            part["output"], filled.values, void=filled.left(), dtype=filled.values.dtype,
+            part["output"], filled.values, void=left, dtype=filled.values.dtype,
             progress=Span(progress, 0.8, 0.95), **writing,
         )  # fmt: skip
         if source_map:

@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from demsmith.core import parallel
 from demsmith.core.errors import InputError
+from demsmith.core.progress import SILENT, checkpoint
 
 
 @dataclass(frozen=True)
@@ -46,13 +48,14 @@ class Rims:
     touches_edge: np.ndarray
 
 
-def find_voids(void):
+def find_voids(void, *, progress=SILENT):
     """Find the 4-connected voids of a mask.
 
     Parameters
     ----------
     void : (H, W) bool array
         True where there is no elevation.
+    progress : Progress
 
     Returns
     -------
@@ -62,6 +65,8 @@ def find_voids(void):
     ------
     InputError
         If ``void`` is no two-dimensional bool array.
+    Cancelled
+        If ``progress`` asks to stop.
 
     Examples
     --------
@@ -77,16 +82,20 @@ def find_voids(void):
     from demsmith.core.voids import _labelling
 
     if void.ndim != 2 or void.dtype != bool:
-        raise InputError(f"the void mask is a {void.ndim}-D {void.dtype} array; give a 2-D bool one")
+        raise InputError(f"the void mask is {void.ndim}-D {void.dtype}; give a 2-D bool array")
     runs = _scan(np.ascontiguousarray(void))
+    checkpoint(progress, 0.3)
     void_of_run = np.empty(len(runs), np.int64)
     count = _labelling.join_runs(runs, void_of_run)
+    checkpoint(progress, 0.6)
     first_run = np.zeros(count + 1, np.int64)
     cells = np.zeros(count, np.int64)
     grouped = np.empty_like(runs)
     _labelling.group_runs(runs, void_of_run, first_run, grouped, cells)
+    checkpoint(progress, 0.8)
     labels = np.zeros(void.shape, np.int32)
     _labelling.paint(grouped, first_run, labels)
+    checkpoint(progress, 1.0)
     return Voids(labels, grouped, first_run, cells)
 
 
@@ -104,28 +113,43 @@ def _scan(void):
         room = count
 
 
-def survey_rims(values, voids, begin=0, end=None):
+def survey_rims(values, void, voids, *, threads=None, progress=SILENT):
     """Measure the known cells that share a side with each void.
 
     Parameters
     ----------
     values : (H, W) array
         Elevations; only known cells are read.
+    void : (H, W) bool array
     voids : Voids
-        As found by `find_voids`.
-    begin, end : int
-        The span of voids to measure; default: all.
+        As `find_voids` found them in ``void``.
+    threads : int, optional
+        Default: one for each core.
+    progress : Progress
 
     Returns
     -------
     Rims
-    """
-    from demsmith.core.voids import _labelling
 
-    end = len(voids) if end is None else end
-    low, mean, high = (np.empty(end - begin) for _ in range(3))
-    edge = np.empty(end - begin, bool)
-    _labelling.survey(
-        values, voids.labels, voids.runs, voids.first_run[begin : end + 1], low, mean, high, edge
+    Raises
+    ------
+    Cancelled
+        If ``progress`` asks to stop.
+    """
+    from demsmith.core.voids._labelling import survey
+
+    low, mean, high = (np.empty(len(voids)) for _ in range(3))
+    edge = np.empty(len(voids), bool)
+    cells = int(voids.cells.sum())
+    parts = max(min(parallel.thread_count(threads), cells // 10_000 + 1), cells // 1_000_000)
+    parallel.run(
+        [
+            lambda begin=begin, end=end: survey(
+                values, void, voids.runs, voids.first_run, begin, end, low, mean, high, edge
+            )
+            for begin, end in parallel.even_spans(voids.cells, parts)
+        ],
+        threads=threads,
+        progress=progress,
     )
     return Rims(low, mean, high, edge)

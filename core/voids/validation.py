@@ -44,7 +44,7 @@ def punch_voids(values, *, known=None, seed=0):
     void = np.zeros(values.shape, bool)
     for scale, share in _MIXTURE:
         noise = gaussian_filter(rng.standard_normal(values.shape), scale)
-        field = noise / noise.std() + 0.5 * gaussian_filter(slope, scale)
+        field = noise / (noise.std() or 1.0) + 0.5 * gaussian_filter(slope, scale)
         void |= field > np.quantile(field, 1 - share)
     return void if known is None else void & known
 

@@ -1,0 +1,1 @@
+"""Demsmith's tools as QGIS's toolbox, models, batch and `qgis_process` see them."""

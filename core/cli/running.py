@@ -1,0 +1,76 @@
+"""Finding the verb, running it, and turning what may happen into words and an exit status."""
+
+import os
+import sys
+import traceback
+
+from cyclopts import App, CycloptsError
+
+import demsmith
+from demsmith.core.cli import interruption
+from demsmith.core.errors import Cancelled, DemsmithError
+
+_VERBS = {
+    "fill": "Fill the voids (holes without data) of an elevation raster.",
+}
+
+
+def make_app():
+    """Make the Cyclopts app; a verb's module is imported when the verb is asked for."""
+    app = App(
+        name="demsmith",
+        help="Mends, compresses and sharpens elevation models.",
+        version=f"demsmith {demsmith.__version__}",
+        help_format="plaintext",
+        suppress_keyboard_interrupt=False,
+        usage="Usage: demsmith VERB INPUT... OUTPUT [--option value]...",
+    )
+    app["--help"].group = app["--version"].group = "Options"
+    for verb, help_text in _VERBS.items():
+        app.command(f"demsmith.core.cli.{verb}:app", name=verb, help=help_text)
+    return app
+
+
+def run(argv=None):
+    """Run a command line; returns the exit status."""
+    try:
+        make_app()(argv, exit_on_error=False, print_error=False, result_action="return_none")
+        sys.stdout.flush()
+    except (Cancelled, KeyboardInterrupt) as stop:
+        _complain(str(stop) or str(Cancelled()))
+        return interruption.exit_status()
+    except CycloptsError as error:
+        _complain(str(error))
+        print(f"see {' '.join(['demsmith', *(error.command_chain or ())])} --help", file=sys.stderr)
+        return 2
+    except DemsmithError as error:
+        _complain(str(error))
+        return error.exit_status
+    except BrokenPipeError:
+        _let_go_of_output()
+        return 1
+    except OSError as error:
+        where = f": '{error.filename}'" if error.filename else ""
+        _complain(f"{error.strerror or error}{where}")
+        _let_go_of_output()
+        return 1
+    except MemoryError as error:
+        _complain(f"not enough memory. {error}".rstrip())
+        return 1
+    except Exception:
+        traceback.print_exc()
+        _complain("this is a fault of Demsmith; please report the lines above")
+        return 1
+    return 0
+
+
+def _complain(message):
+    print(f"error: {message}", file=sys.stderr)
+
+
+def _let_go_of_output():
+    """If what was printed cannot be written, keep Python from trying it again on exit."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115, till the end

@@ -1,0 +1,1 @@
+"""Demsmith as a plugin in the QGIS window."""

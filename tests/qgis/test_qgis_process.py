@@ -1,0 +1,75 @@
+"""The plugin in the real `qgis_process`, as a user installs it."""
+
+import json
+import os
+import shutil
+import subprocess
+import sysconfig
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gdal_reading import read
+
+ROOT = Path(__file__).resolve().parents[2]
+VOID = -32768
+
+
+@pytest.fixture(scope="module")
+def qgis_process(tmp_path_factory):
+    """Give a function that calls `qgis_process` with the checkout enabled as a plugin."""
+    # Debian's wrapper of this name adds a flag that its own program does not know.
+    program = shutil.which("qgis_process.bin") or shutil.which("qgis_process")
+    if program is None:
+        pytest.skip("qgis_process is not installed")
+    plugins = tmp_path_factory.mktemp("plugins")
+    (plugins / "demsmith").symlink_to(ROOT)
+    home = tmp_path_factory.mktemp("home")
+    environment = {
+        **os.environ,
+        "QGIS_CUSTOM_CONFIG_PATH": str(home),  # pytest-qgis sets it, to a folder that stays
+        "QGIS_PLUGINPATH": str(plugins),
+        "PYTHONPATH": sysconfig.get_path("purelib"),
+        "QT_QPA_PLATFORM": "offscreen",
+    }
+
+    def call(*arguments):
+        return subprocess.run(
+            [program, *arguments], env=environment, capture_output=True, text=True,
+            timeout=240, check=False,
+        )  # fmt: skip
+
+    enabled = call("plugins", "enable", "demsmith")
+    assert enabled.returncode == 0, enabled.stderr
+    return call
+
+
+def test_the_tool_is_listed_with_its_words(qgis_process):
+    told = json.loads(qgis_process("--json", "help", "demsmith:fillvoids").stdout)
+    assert told["provider_details"]["name"] == "Demsmith"
+    assert {"INPUT", "METHOD", "OUTPUT", "L_BU"} <= set(told["parameters"])
+    assert {"CELLS_FILLED", "WARNINGS"} <= set(told["outputs"])
+
+
+def test_fills_a_tile(qgis_process, holed, tmp_path):
+    source, values = holed
+    target = tmp_path / "filled.tif"
+    done = qgis_process(
+        "--json", "run", "demsmith:fillvoids", f"--INPUT={source}", "--VARIANT=weighted",
+        f"--OUTPUT={target}",
+    )  # fmt: skip
+    results = json.loads(done.stdout)["results"]
+    assert results["OUTPUT"] == str(target)
+    assert (results["CELLS_FILLED"], results["CELLS_UNFILLED"]) == (58, 0)
+    filled = read(str(target))[0]
+    assert np.array_equal(filled[values != VOID], values[values != VOID])
+    assert not (filled == VOID).any()
+
+
+def test_says_what_is_wrong(qgis_process, holed, tmp_path):
+    target = tmp_path / "filled.tif"
+    done = qgis_process(
+        "run", "demsmith:fillvoids", f"--INPUT={holed[0]}", "--BAND=4", f"--OUTPUT={target}"
+    )
+    assert "band 4 asked" in done.stdout + done.stderr
+    assert not target.exists()
