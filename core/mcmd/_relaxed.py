@@ -242,18 +242,24 @@ def pin(values, labels, points, rows, usable, count, level):
     Ground narrower than the step, such as an island in the void or a strip at the raster's edge,
     would else be met at the finest level only, whose few sweeps would leave a spike there. As in
     the bottom-up pass the points take its elevation: the mean of the known cells up to half a step
-    away, by inverse squared distance. Returns how many points are left.
+    away, or as far as the edge, by inverse squared distance. Returns how many points are left.
     """
     height, width = labels.shape
-    half = 1 << (level - 1)
+    step = 1 << level
+    half = step // 2
     kept = 0
     for i in range(count):
         row = np.int64(rows[i])
         column = np.int64(points[i]) - row * width
         total, weight = 0.0, 0.0
-        if not _known_beside(labels, row, column, 1 << level):
-            for r in range(max(row - half, 0), min(row + half + 1, height)):
-                for c in range(max(column - half, 0), min(column + half + 1, width)):
+        if not _known_beside(labels, row, column, step):
+            # The last points before the raster's edge stand for all that is beyond them.
+            top = row - half if row >= step else 0
+            left = column - half if column >= step else 0
+            bottom = row + half + 1 if row + step < height else height
+            right = column + half + 1 if column + step < width else width
+            for r in range(top, bottom):
+                for c in range(left, right):
                     if labels[r, c] == 0:
                         near = 1.0 / ((r - row) ** 2 + (c - column) ** 2)
                         total += near * values[r, c]

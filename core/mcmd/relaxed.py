@@ -20,6 +20,7 @@ OMEGA = 1.7
 TENSION_CELLS = 12.0
 _LARGE = 200_000
 _BLOCK = 4_000_000
+_SPAN = 50_000
 
 
 def relax_voids(
@@ -107,7 +108,9 @@ def _fill_small(values, voids, selected, starts, stencils, offsets, threads, pro
 
 
 def _over_spans(cells, make_task, threads, progress):
-    spans = parallel.even_spans(cells, 16 * parallel.thread_count(threads))
+    # Small enough for progress and an even load, large enough that starting one costs nothing.
+    parts = max(4 * parallel.thread_count(threads), int(cells.sum()) // _SPAN)
+    spans = parallel.even_spans(cells, parts)
     parallel.run(
         [make_task(slice(begin, end)) for begin, end in spans],
         weights=[cells[begin:end].sum() for begin, end in spans],

@@ -1,0 +1,381 @@
+"""What holds of every fill: known cells, types, layouts, threads, progress, refusals."""
+
+import itertools
+import threading
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scenes import disc, fractal, holed, plane
+
+from demsmith.core.errors import Cancelled, InputError
+from demsmith.core.voids import FILLED, LEFT, ORIGINAL, FillOptions, fill_voids, find_voids
+
+VARIANTS = ("relaxed", "weighted", "paper")
+SCHEMES = ("triangle-edge", "diamond-square")
+DTYPES = (
+    "int8", "uint8", "int16", ">i2", "uint16", "int32", ">i4", "uint32", "int64", "uint64",
+    "float16", "float32", ">f4", "float64", ">f8", "longdouble",
+)  # fmt: skip
+LAYOUTS = ("C", "fortran", "steps", "reversed", "read-only")
+
+
+def laid_out(values, layout):
+    if layout == "fortran":
+        return np.asfortranarray(values)
+    if layout == "steps":
+        return np.repeat(np.repeat(values, 2, 0), 3, 1)[::2, ::3]
+    if layout == "reversed":
+        return values[::-1, ::-1].copy()[::-1, ::-1]
+    if layout == "read-only":
+        values = values.copy()
+        values.flags.writeable = False
+    return values
+
+
+@st.composite
+def rasters(draw):
+    """A raster with at least one known and one void cell."""
+    shape = draw(
+        st.sampled_from([(1, 2), (1, 40), (40, 1), (2, 2), (3, 3), (5, 4), (17, 17), (33, 70)])
+        | st.tuples(st.integers(1, 60), st.integers(2, 60))
+    )
+    rng = np.random.default_rng(draw(st.integers(0, 1000)))
+    share = draw(st.sampled_from([0.0, 0.05, 0.5, 0.95, 1.0]))
+    void = rng.random(shape) < share
+    first, second = rng.permutation(void.size)[:2]
+    void.flat[first], void.flat[second] = True, False  # share 1: all but one
+    dtype = np.dtype(draw(st.sampled_from(DTYPES)))
+    values = (rng.random(shape) * 100).astype(dtype)
+    if dtype.kind != "u":
+        values = values - np.asarray(50, dtype)
+    values[void] = values.dtype.type(77)
+    return values.astype(dtype), void
+
+
+@given(
+    rasters(), st.sampled_from(VARIANTS), st.sampled_from(SCHEMES), st.sampled_from([0.0, 0.3]),
+    st.sampled_from(LAYOUTS), st.booleans(),
+)  # fmt: skip
+def test_every_void_is_filled_and_no_known_cell_changed(
+    raster, variant, scheme, r_s, layout, float_output
+):
+    values, void = raster
+    given_ = laid_out(values, layout)
+    before, void_before = values.tobytes(), void.tobytes()
+    filled = fill_voids(
+        given_, laid_out(void, layout), variant=variant, scheme=scheme, r_s=r_s,
+        float_output=float_output, pixel_size=(30.0, 31.0),
+    )  # fmt: skip
+    assert np.ascontiguousarray(given_).tobytes() == before == values.tobytes()
+    assert void.tobytes() == void_before
+    out = filled.values
+    if float_output and values.dtype.kind != "f":
+        assert out.dtype == (np.float32 if values.dtype.itemsize <= 2 else np.float64)
+        np.testing.assert_array_equal(out[~void], values[~void])
+    else:
+        assert out.dtype == values.dtype
+        assert out[~void].tobytes() == values[~void].tobytes()
+    assert np.isfinite(out.astype(np.float64)).all()
+    assert filled.cells_filled == void.sum()
+    np.testing.assert_array_equal(filled.source(), np.where(void, FILLED, ORIGINAL))
+    assert not filled.left().any()
+    if r_s == 0 and variant != "relaxed":
+        # Means of known cells: nothing beyond them.
+        known = values[~void].astype(np.float64)
+        assert out[void].min() >= known.min() - 1e-3 and out[void].max() <= known.max() + 1e-3
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("dtype", ["int16", ">i2", "float32", ">f4", "float64", ">f8"])
+def test_layout_and_byte_order_do_not_matter(dtype, layout):
+    truth, void = fractal((40, 50)).astype(dtype), disc((40, 50), (20, 20), 9)
+    plain = fill_voids(truth.astype(np.dtype(dtype).newbyteorder("=")), void).values
+    other = fill_voids(laid_out(truth, layout), laid_out(void, layout)).values
+    np.testing.assert_array_equal(other, plain)
+
+
+def test_integers_are_rounded_to_the_nearest():
+    truth, void = fractal((60, 60)), disc((60, 60), (30, 30), 12)
+    whole = np.rint(truth).astype(np.int16)
+    in_float = fill_voids(whole, void, float_output=True).values
+    in_int = fill_voids(whole, void).values
+    np.testing.assert_array_equal(in_int, np.rint(in_float).astype(np.int16))
+    assert (in_float[void] != np.rint(in_float[void])).any()
+
+
+@pytest.mark.parametrize(("dtype", "top"), [("uint8", 255), ("int8", 127), ("int16", 32767)])
+def test_overshoot_stops_at_the_types_limits(dtype, top):
+    """A slope that ends at the limit would go on beyond it, and wrap around to the other end."""
+    ground = plane((40, 40), slope=(0, 4.0), height=0)
+    ground = np.minimum(ground - ground[0, 19] + top, top)
+    ground = np.maximum(ground, np.iinfo(dtype).min).astype(dtype)
+    void = holed((40, 40), (8, 32, 19, 33))
+    real = fill_voids(ground.astype(np.float64), void).values
+    assert real[void].max() > top + 1
+    filled = fill_voids(ground, void).values
+    np.testing.assert_array_equal(filled[void], np.rint(np.minimum(real, top)).astype(dtype)[void])
+
+
+# --- where voids come from -----------------------------------------------------------------------
+
+
+def test_nan_and_infinity_are_voids():
+    truth = plane((30, 30))
+    values = truth.copy()
+    values[4:7, 5:9], values[20, 20], values[21, 20] = np.nan, np.inf, -np.inf
+    filled = fill_voids(values)
+    assert filled.cells_filled == 14
+    assert abs(filled.values - truth).max() < 0.5
+
+
+@pytest.mark.parametrize("dtype", ["int16", "float32"])
+def test_masked_cells_are_voids(dtype):
+    """As rasterio reads them: the data below a mask is no ground."""
+    truth, void = plane((30, 30)).astype(dtype), disc((30, 30), (15, 15), 5)
+    masked = np.ma.masked_array(np.where(void, -999, truth).astype(dtype), void)
+    filled = fill_voids(masked)
+    assert type(filled.values) is np.ndarray
+    assert filled.cells_filled == void.sum()
+    np.testing.assert_array_equal(filled.values, fill_voids(truth, void).values)
+
+
+def test_integers_without_a_mask_have_no_voids():
+    filled = fill_voids(np.arange(12, dtype=np.int16).reshape(3, 4))
+    assert filled.cells_filled == 0 and len(filled.voids) == 0
+    np.testing.assert_array_equal(filled.values, np.arange(12).reshape(3, 4))
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_what_lies_in_a_void_does_not_matter(variant):
+    truth, void = fractal((40, 50)), disc((40, 50), (20, 20), 9)
+    plain = fill_voids(truth, void, variant=variant, r_s=0.1).values
+    for rubbish in (np.nan, -3.4e38, np.inf):
+        spoilt = np.where(void, rubbish, truth)
+        again = fill_voids(spoilt, void, variant=variant, r_s=0.1).values
+        np.testing.assert_array_equal(again, plain)
+
+
+# --- which voids, and where to -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("dtype", ["int16", "float32"])
+def test_selection(variant, dtype):
+    truth = fractal((60, 60)).astype(dtype)
+    edge, small, large = (
+        holed((60, 60), box) for box in ((0, 3, 10, 12), (20, 22, 20, 23), (40, 50, 30, 44))
+    )
+    values = np.where(edge | small | large, np.asarray(-5, dtype), truth)
+    every = fill_voids(values, edge | small | large, variant=variant).values
+    cases = {
+        (): edge | small | large,
+        (("interior_only", True),): small | large,
+        (("max_size", 6),): edge | small,
+        (("max_size", 5),): holed((60, 60)),
+        (("interior_only", True), ("max_size", 6)): small,
+    }
+    for options, wanted in cases.items():
+        filled = fill_voids(values, edge | small | large, variant=variant, **dict(options))
+        np.testing.assert_array_equal(filled.values, np.where(wanted, every, values))
+        np.testing.assert_array_equal(
+            filled.source(),
+            np.select([wanted, edge | small | large], [FILLED, LEFT], ORIGINAL),
+        )
+        np.testing.assert_array_equal(filled.left(), (edge | small | large) & ~wanted)
+        assert filled.cells_filled == wanted.sum()
+
+
+@pytest.mark.parametrize("layout", ["C", "fortran", "steps", "reversed"])
+@pytest.mark.parametrize("dtype", ["int16", "float32", ">f4", "float64"])
+def test_in_place_and_into_another_array(dtype, layout):
+    truth, void = fractal((40, 50)).astype(dtype), disc((40, 50), (20, 20), 9)
+    expected = fill_voids(truth, void).values
+    values = laid_out(truth.copy(), layout)
+    assert fill_voids(values, void, out=values).values is values
+    np.testing.assert_array_equal(values, expected)
+    target = laid_out(np.zeros_like(truth), layout)
+    source = truth.copy()
+    assert fill_voids(source, void, out=target).values is target
+    np.testing.assert_array_equal(target, expected)
+    np.testing.assert_array_equal(source, truth)
+
+
+# --- threads and repetition ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("r_s", [0.0, 0.3])
+@pytest.mark.parametrize(("variant", "scheme"), list(itertools.product(VARIANTS, SCHEMES)))
+def test_same_bytes_whatever_the_threads(variant, scheme, r_s):
+    rng = np.random.default_rng(1)
+    truth = fractal((300, 310)).astype(np.float32)
+    void = (rng.random(truth.shape) < 0.1) | disc(truth.shape, (150, 150), 60)
+    fills = {
+        fill_voids(
+            truth, void, variant=variant, scheme=scheme, r_s=r_s, seed=5, threads=threads
+        ).values.tobytes()
+        for threads in (1, 2, 5, None, 1)
+    }
+    assert len(fills) == 1
+
+
+def test_wide_levels_are_cut_into_blocks_without_a_trace(monkeypatch):
+    """A lattice large enough for several blocks a level, one thread and four."""
+    truth = fractal((1300, 1300)).astype(np.float32)
+    void = np.random.default_rng(0).random(truth.shape) < 0.5
+    for variant in ("weighted", "paper"):
+        one, four = (
+            fill_voids(truth, void, variant=variant, threads=threads).values for threads in (1, 4)
+        )
+        np.testing.assert_array_equal(one, four)
+
+
+def test_calls_from_many_threads():
+    truth, void = fractal((80, 80)), disc((80, 80), (40, 40), 20)
+    expected = fill_voids(truth, void).values
+    results = [None] * 4
+
+    def work(n):
+        results[n] = fill_voids(truth, void, threads=2).values
+
+    workers = [threading.Thread(target=work, args=(n,)) for n in range(4)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    for result in results:
+        np.testing.assert_array_equal(result, expected)
+
+
+# --- progress and cancel -------------------------------------------------------------------------
+
+
+class Recorder:
+    """Notes every report; asks to stop once ``stop_at`` is reached."""
+
+    def __init__(self, stop_at=None):
+        self.fractions, self.stop_at, self.thread = [], stop_at, threading.get_ident()
+        self.asked = None
+
+    def report(self, fraction):
+        assert threading.get_ident() == self.thread  # a GUI may not be touched from another
+        self.fractions.append(fraction)
+
+    def cancelled(self):
+        reached = self.stop_at is not None and max(self.fractions, default=0) >= self.stop_at
+        if reached and self.asked is None:
+            self.asked = time.perf_counter()
+        return reached
+
+
+CASES = {
+    "many small": lambda shape: np.random.default_rng(0).random(shape) < 0.3,
+    "one large": lambda shape: disc(shape, (400, 400), 350),
+    "both": lambda shape: (
+        disc(shape, (400, 400), 300) | (np.random.default_rng(0).random(shape) < 0.1)
+    ),
+}
+
+
+@pytest.mark.parametrize("r_s", [0.0, 0.2])
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_progress_rises_from_0_to_1(variant, case, threads, r_s):
+    truth = fractal((800, 800)).astype(np.float32)
+    void = CASES[case](truth.shape)
+    show = Recorder()
+    fill_voids(truth, void, variant=variant, threads=threads, progress=show, r_s=r_s)
+    assert len(show.fractions) >= 5
+    assert (np.diff(show.fractions) >= 0).all()
+    assert 0 <= show.fractions[0] < 0.6
+    assert 0.8 < show.fractions[-1] <= 1
+
+
+@pytest.mark.parametrize("stop_at", [0.0, 0.4])
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_cancel_is_prompt(variant, case, threads, stop_at):
+    truth = fractal((800, 800)).astype(np.float32)
+    void = CASES[case](truth.shape)
+    fill_voids(truth[:50, :50], void[:50, :50] | (truth[:50, :50] < 0), variant=variant)
+    show, before = Recorder(stop_at), truth.copy()
+    with pytest.raises(Cancelled):
+        fill_voids(truth, void, variant=variant, threads=threads, progress=show)
+    assert time.perf_counter() - show.asked < 0.5
+    assert max(show.fractions, default=0) < 0.95
+    np.testing.assert_array_equal(truth, before)
+
+
+# --- refusals ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: fill_voids(np.full((3, 3), np.nan)), "every cell is a void"),
+        (lambda: fill_voids(np.zeros((3, 3)), np.ones((3, 3), bool)), "every cell is a void"),
+        (lambda: fill_voids(np.zeros(3)), r"shape \(3,\)"),
+        (lambda: fill_voids(np.zeros((2, 3, 4))), "2-D"),
+        (lambda: fill_voids(np.zeros((0, 4))), "2-D"),
+        (lambda: fill_voids(np.zeros((2, 3), complex)), "complex128"),
+        (lambda: fill_voids(np.zeros((2, 3), bool)), "bool"),
+        (lambda: fill_voids(np.array([["1", "2"]])), "integers or real numbers"),
+        (lambda: fill_voids(np.zeros((2, 3)), np.zeros((3, 2), bool)), r"\(3, 2\).*\(2, 3\)"),
+        (lambda: fill_voids(np.zeros((2, 3)), out=np.zeros((3, 2))), r"out is float64 \(3, 2\)"),
+        (lambda: fill_voids(np.zeros((2, 3)), out=np.zeros((2, 3), "f4")), "must be float64"),
+        (lambda: fill_voids(np.array([[0, np.nan, 0]] * 2), pixel_size=0), "positive and finite"),
+        (lambda: fill_voids(np.array([[0, np.nan, 0]] * 2), pixel_size=(1, 2, 3)), "3 parts"),
+        (
+            lambda: fill_voids(np.array([[0, np.nan, 0]] * 2), pixel_size=(1, np.nan)),
+            "positive and finite",
+        ),
+        (
+            lambda: fill_voids(np.array([[0, np.nan, 0]] * 2), pixel_size=(np.ones(3), 1)),
+            r"\(3,\) for 2 rows",
+        ),
+        (lambda: fill_voids(np.zeros((2, 3)), colour="red"), "colour"),
+        (lambda: fill_voids(np.zeros((2, 3)), options=FillOptions(), seed=3), "not both"),
+        (lambda: fill_voids(np.zeros((2, 3)), l=1.0), "'relaxed' has no such curve"),
+        (lambda: fill_voids(np.zeros((2, 3)), l_bu=1.0), "'relaxed' has no such curve"),
+        (lambda: fill_voids(np.zeros((2, 3)), variant="best"), "relaxed, weighted, paper"),
+        (lambda: fill_voids(np.zeros((2, 3)), threads=0), "at least 1"),
+        (lambda: fill_voids(np.zeros((2, 3)), variant="paper", datum=1), "datum 1 m is above"),
+    ],
+)
+def test_refusals(call, message):
+    with pytest.raises(InputError, match=message):
+        call()
+
+
+def test_options_may_be_given_at_once_or_one_by_one():
+    truth, void = fractal((40, 50)), disc((40, 50), (20, 20), 9)
+    once = fill_voids(truth, void, options=FillOptions(variant="paper", l_bu=2.0, l=1.0)).values
+    each = fill_voids(truth, void, variant="paper", l_bu=2.0, l=1.0).values
+    np.testing.assert_array_equal(once, each)
+    assert (once != fill_voids(truth, void, variant="paper").values).any()
+
+
+@pytest.mark.parametrize("name", ["l", "l_bu", "datum"])
+def test_curve_options_have_an_effect(name):
+    truth, void = fractal((40, 50)) + 100, disc((40, 50), (20, 20), 9)
+    base = dict(variant="weighted", l=1.0, l_bu=1.0, datum=50.0)
+    plain = fill_voids(truth, void, **base).values
+    other = fill_voids(truth, void, **(base | {name: base[name] - 0.5})).values
+    assert (other[void] != plain[void]).any()
+
+
+def test_d_max_has_an_effect():
+    truth, void = fractal((40, 50)), disc((40, 50), (20, 20), 9)
+    near, far = (
+        fill_voids(truth, void, variant="paper", l=1.0, d_max=d).values for d in (30.0, 3000.0)
+    )
+    assert near[void].mean() < far[void].mean() - 1
+
+
+def test_voids_of_a_fill_are_found_voids():
+    truth, void = fractal((40, 50)), disc((40, 50), (20, 20), 9)
+    np.testing.assert_array_equal(fill_voids(truth, void).voids.labels, find_voids(void).labels)
