@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import tiles
-from osgeo import gdal
+from osgeo import gdal, osr
 
 import demsmith
 from demsmith.core import raster
@@ -255,13 +255,21 @@ def raw_tiles():
             result = demsmith.fill_file(tiles.DATA / path, out, overwrite=True)
             before, after = raster.read(tiles.DATA / path), raster.read(out)
             changed = int((before.values != after.values)[~before.void].sum())
-            kept = before.values.dtype == after.values.dtype and before.grid == after.grid
+            kept = before.values.dtype == after.values.dtype and same_place(before.grid, after.grid)
             lines.append(
                 f"| {name} | {result.voids} | {result.cells_void} | {result.largest_void} "
                 f"| {int(after.void.sum())} | {changed} | {'yes' if kept else 'NO'} "
                 f"| {result.seconds:.2f} |"
             )
     return "\n".join(lines)
+
+
+def same_place(one, other):
+    """Tell whether two grids lie on the same ground, however their CRS is spelled."""
+    crs = [osr.SpatialReference(grid.crs) for grid in (one, other)]
+    same_crs = crs[0].IsSame(crs[1]) if one.crs and other.crs else one.crs == other.crs
+    same_cells = np.allclose(one.geotransform, other.geotransform, rtol=1e-12, atol=0)
+    return one.shape == other.shape and same_cells and bool(same_crs)
 
 
 def same_bytes():

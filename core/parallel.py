@@ -1,13 +1,14 @@
 """Row blocks and voids side by side in threads, with progress and cancel."""
 
 import os
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+import threading
+from collections import deque
 from itertools import pairwise
 
 import numpy as np
 
-from demsmith.core.errors import Cancelled, InputError
-from demsmith.core.progress import SILENT
+from demsmith.core.errors import InputError
+from demsmith.core.progress import SILENT, checkpoint
 
 
 def thread_count(threads=None):
@@ -29,6 +30,7 @@ def run(tasks, *, threads=None, progress=SILENT, weights=None):
     """Call every task, a function without arguments, in ``threads`` threads.
 
     Tasks must be independent of each other, so that the result does not depend on ``threads``.
+    The calling thread does its share, for a new one may take milliseconds to begin.
 
     Parameters
     ----------
@@ -47,33 +49,56 @@ def run(tasks, *, threads=None, progress=SILENT, weights=None):
         If ``progress`` asks to stop; tasks not begun are dropped, those begun are waited for.
     """
     tasks = list(tasks)
-    weights = [1.0] * len(tasks) if weights is None else weights
-    total, done = float(sum(weights)) or 1.0, 0.0
-    workers = min(thread_count(threads), len(tasks))
-    if workers <= 1:
-        for task, weight in zip(tasks, weights, strict=True):
-            if progress.cancelled():
-                raise Cancelled()
-            task()
-            done += float(weight)
-            progress.report(min(done / total, 1.0))
-        return
-    with ThreadPoolExecutor(workers) as pool:
-        pending = {
-            pool.submit(task): float(weight) for task, weight in zip(tasks, weights, strict=True)
-        }
+    weights = [1.0] * len(tasks) if weights is None else [float(weight) for weight in weights]
+    waiting = deque(zip(tasks, weights, strict=True))
+    done, errors = [], []
+    total = sum(weights) or 1.0
+
+    def help_out():
         try:
-            while pending:
-                finished, _ = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    done += pending.pop(future)
-                    future.result()
-                if progress.cancelled():
-                    raise Cancelled()
-                progress.report(min(done / total, 1.0))
-        finally:
-            for future in pending:
-                future.cancel()
+            while not errors and _do_next(waiting, done):
+                pass
+        except BaseException as error:  # it is raised again in the calling thread
+            errors.append(error)
+
+    helpers = [
+        threading.Thread(target=help_out, daemon=True)
+        for _ in range(min(thread_count(threads), len(tasks)) - 1)
+    ]
+    try:
+        for helper in helpers:
+            helper.start()
+        while waiting and not errors:
+            _check(progress, done, total)
+            _do_next(waiting, done)
+        for helper in helpers:
+            while helper.is_alive():
+                helper.join(0.2)
+                _check(progress, done, total)
+    finally:
+        waiting.clear()
+        for helper in helpers:
+            if helper.ident is not None:
+                helper.join()
+    if errors:
+        raise errors[0]
+    if tasks:
+        _check(progress, done, total)
+
+
+def _do_next(waiting, done):
+    """Do the next task that waits; tell whether there was one."""
+    try:
+        task, weight = waiting.popleft()
+    except IndexError:
+        return False
+    task()
+    done.append(weight)
+    return True
+
+
+def _check(progress, done, total):
+    checkpoint(progress, min(sum(done) / total, 1.0))
 
 
 def even_spans(weights, parts):

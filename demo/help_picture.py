@@ -6,10 +6,10 @@ Run it from anywhere: ``.venv/bin/python demo/help_picture.py``.
 from pathlib import Path
 
 import numpy as np
-from demo import SEED, jacksboro
 from picture import relief
 
 import demsmith
+from demo import SEED, jacksboro
 from demsmith.core.voids.validation import punch_voids
 
 TARGET = Path(__file__).parents[1] / "algorithms" / "help" / "fillvoids.png"

@@ -3,7 +3,7 @@
 import numba
 import numpy as np
 
-from demsmith.core.mcmd._relaxed import coarsest_level
+from demsmith.core.mcmd._points import coarsest_level
 
 _JIT = dict(nogil=True, cache=True, error_model="numpy")
 
@@ -64,7 +64,7 @@ def _displace_level(
     labels, runs, a, b, own, step, centres, sums, amplitude, shift, seed, row_offset, column_offset
 ):
     for k in range(a, b):
-        row, start, stop = runs[k]
+        row, start, stop = runs[k, 0], runs[k, 1], runs[k, 2]
         if (row + row_offset) % step:
             continue
         row_odd = (row + row_offset) & step != 0

@@ -21,7 +21,7 @@ class McmdOptions:
     )  # fmt: skip
     scheme: str = option(
         str, "triangle-edge", "Subdivision scheme",
-        "How midpoints descend from their neighbours: triangle-edge or diamond-square.",
+        "Which neighbours a midpoint descends from. Variants weighted and paper only.",
         choices=SCHEMES, advanced=True,
     )  # fmt: skip
     l: float = option(  # noqa: E741, the paper's name

@@ -127,34 +127,32 @@ def _fill_large(values, voids, selected, starts, stencils, offsets, progress):
 
 
 def _fill_one(values, voids, void, start, stencils, offsets, progress):
-    from demsmith.core.mcmd import _relaxed as kernels
+    from demsmith.core.mcmd import _points as points
+    from demsmith.core.mcmd._relaxed import predict, relax
 
     a, b = int(voids.first_run[void]), int(voids.first_run[void + 1])
-    room = int(voids.cells[void])
-    points, rows = np.empty(room, np.uint64), np.empty(room, np.int32)
-    usable = np.empty(room, np.int16)
-    kernels.flood(values, voids.runs, a, b, start)
-    coarsest = kernels.coarsest_level(voids.runs, a, b)
+    segments = np.empty((b - a, points.COLUMNS), np.int64)
+    bits = np.empty(int(voids.cells[void]), np.int16)
+    points.flood(values, voids.runs, a, b, start)
     # A level has a quarter of the next finer one's points and twice its sweeps.
     done = 0.0
-    for level in range(coarsest, -1, -1):
-        count = kernels.gather(
-            voids.labels, voids.runs, a, b, void + 1, level, *offsets, points, rows, usable
+    for level in range(points.coarsest_level(voids.runs, a, b), -1, -1):
+        count = points.gather(
+            voids.labels, voids.runs, a, b, void + 1, level, *offsets, segments, bits
         )
         if level:
-            count = kernels.pin(values, voids.labels, points, rows, usable, count, level)
-        if count:
-            kernels.predict(values, points, usable, count, level)
+            points.pin(values, voids.labels, segments, count, bits, level)
+        checkpoint(progress, done)
+        predict(values, segments, count, bits, level)
         sweeps = FINEST_SWEEPS << level
-        blocks = [(low, min(low + _BLOCK, count)) for low in range(0, count, _BLOCK)]
+        lengths = segments[:count, points.LENGTH]
+        blocks = parallel.even_spans(lengths, int(lengths.sum()) // _BLOCK + 1)
         # The coarse levels' many sweeps over few points go in bundles of about a block's work.
-        bundle = max(1, _BLOCK // max(count, 1) // 2 * 2)
+        bundle = max(1, _BLOCK // max(int(lengths.sum()), 1) // 2 * 2)
         for sweep in range(0, sweeps, bundle):
             last = min(sweep + bundle, sweeps)
             for low, high in blocks if sweep % 2 == 0 else reversed(blocks):
-                kernels.relax(
-                    values, points, rows, usable, low, high, level, stencils, OMEGA, sweep, last
-                )
+                relax(values, segments, low, high, bits, level, stencils, OMEGA, sweep, last)
                 checkpoint(progress, done + 0.5 ** (level + 1) * last / sweeps)
         done += 0.5 ** (level + 1)
 

@@ -53,7 +53,7 @@ def join_runs(runs, parent):
         parent[k] = k
     above = 0
     for k in range(runs.shape[0]):
-        row, start, stop = runs[k]
+        row, start, stop = runs[k, 0], runs[k, 1], runs[k, 2]
         while runs[above, 0] < row - 1 or (runs[above, 0] == row - 1 and runs[above, 2] <= start):
             above += 1
         other = above
@@ -114,7 +114,7 @@ def paint(runs, first_run, labels):
     """Write 1 + its number into the cells of each void."""
     for void in range(first_run.size - 1):
         for k in range(first_run[void], first_run[void + 1]):
-            row, start, stop = runs[k]
+            row, start, stop = runs[k, 0], runs[k, 1], runs[k, 2]
             for column in range(start, stop):
                 labels[row, column] = void + 1
 
@@ -131,7 +131,7 @@ def survey(values, void, runs, first_run, begin, end, low, mean, high, touches_e
         total, count = 0.0, 0
         edge = False
         for k in range(first_run[number], first_run[number + 1]):
-            row, start, stop = runs[k]
+            row, start, stop = runs[k, 0], runs[k, 1], runs[k, 2]
             edge |= row == 0 or row == height - 1 or start == 0 or stop == width
             for other in range(row - 1, row + 2):
                 if other < 0 or other >= height:

@@ -83,7 +83,8 @@ def fill_voids(
     values : (H, W) array of a real or integer type
         Elevations [m].
     void : (H, W) bool array, optional
-        True where there is no elevation. Default: where ``values`` is masked or not finite.
+        True where there is no elevation. Cells that are not finite are voids in any case, and
+        those of a masked array where this is not given.
     options : FillOptions, optional
         How to fill; its fields can as well be given as keywords of their own.
     pixel_size : float, (float, float) or (array, array), optional
@@ -166,13 +167,15 @@ def _checked(values, void):
         raise InputError(f"values has shape {values.shape}; give a 2-D array of elevations")
     if values.dtype.kind not in "iuf":
         raise InputError(f"values is of type {values.dtype}; give integers or real numbers")
-    if void is None:
-        void = ~np.isfinite(values) if values.dtype.kind == "f" else np.zeros(values.shape, bool)
-        void |= masked
-    void = np.asarray(void)
+    void = np.broadcast_to(masked, values.shape) if void is None else np.asarray(void)
     if void.shape != values.shape:
         raise InputError(f"void has shape {void.shape}, values {values.shape}")
-    return values, np.ascontiguousarray(void.astype(bool, copy=False))
+    void = np.ascontiguousarray(void.astype(bool, copy=False))
+    if values.dtype.kind == "f":
+        unknown = ~np.isfinite(values)
+        if np.greater(unknown, void).any():
+            void = void | unknown
+    return values, void
 
 
 def _working_array(values, out, options):

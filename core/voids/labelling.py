@@ -93,7 +93,9 @@ def find_voids(void, *, progress=SILENT):
     grouped = np.empty_like(runs)
     _labelling.group_runs(runs, void_of_run, first_run, grouped, cells)
     checkpoint(progress, 0.8)
-    labels = np.zeros(void.shape, np.int32)
+    # Not zeros(): NumPy asks for huge pages for this one, and the kernels jump from row to row.
+    labels = np.empty(void.shape, np.int32)
+    labels.fill(0)
     _labelling.paint(grouped, first_run, labels)
     checkpoint(progress, 1.0)
     return Voids(labels, grouped, first_run, cells)
@@ -141,7 +143,7 @@ def survey_rims(values, void, voids, *, threads=None, progress=SILENT):
     low, mean, high = (np.empty(len(voids)) for _ in range(3))
     edge = np.empty(len(voids), bool)
     cells = int(voids.cells.sum())
-    parts = max(min(parallel.thread_count(threads), cells // 10_000 + 1), cells // 1_000_000)
+    parts = cells // 500_000 + 1  # a thread is not worth less
     parallel.run(
         [
             lambda begin=begin, end=end: survey(
