@@ -127,7 +127,7 @@ def fill_voids(
     """
     options = _options(options, parameters)
     values, void = _checked(values, void)
-    voids = find_voids(void, progress=Span(progress, 0, 0.1))
+    voids = find_voids(void, threads=threads, progress=Span(progress, 0, 0.1))
     if voids.cells.sum() == void.size:
         raise InputError("every cell is a void; there is nothing to fill from")
     work, out = _working_array(values, out, options)
@@ -171,11 +171,17 @@ def _checked(values, void):
     if void.shape != values.shape:
         raise InputError(f"void has shape {void.shape}, values {values.shape}")
     void = np.ascontiguousarray(void.astype(bool, copy=False))
-    if values.dtype.kind == "f":
-        unknown = ~np.isfinite(values)
-        if np.greater(unknown, void).any():
-            void = void | unknown
+    if values.dtype.kind == "f" and _hides_unknown(values, void):
+        void = void | ~np.isfinite(values)
     return values, void
+
+
+def _hides_unknown(values, void):
+    """Tell whether a cell that is not finite is no void."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        if np.isfinite(values.sum()):  # a sum is finite only if all its terms are, and quick
+            return False
+    return bool(np.less(np.isfinite(values), ~void).any())
 
 
 def _working_array(values, out, options):

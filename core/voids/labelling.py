@@ -6,7 +6,10 @@ import numpy as np
 
 from demsmith.core import parallel
 from demsmith.core.errors import InputError
-from demsmith.core.progress import SILENT, checkpoint
+from demsmith.core.progress import SILENT, Span, checkpoint
+
+# A raster of fewer cells is scanned sooner than a thread begins.
+_LARGE = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -48,13 +51,15 @@ class Rims:
     touches_edge: np.ndarray
 
 
-def find_voids(void, *, progress=SILENT):
+def find_voids(void, *, threads=None, progress=SILENT):
     """Find the 4-connected voids of a mask.
 
     Parameters
     ----------
     void : (H, W) bool array
         True where there is no elevation.
+    threads : int, optional
+        Default: one for each core.
     progress : Progress
 
     Returns
@@ -83,8 +88,16 @@ def find_voids(void, *, progress=SILENT):
 
     if void.ndim != 2 or void.dtype != bool:
         raise InputError(f"the void mask is {void.ndim}-D {void.dtype}; give a 2-D bool array")
-    runs = _scan(np.ascontiguousarray(void))
-    checkpoint(progress, 0.3)
+    void = np.ascontiguousarray(void)
+    # Not zeros(): NumPy asks for huge pages for this one, and the kernels jump from row to row.
+    labels = np.empty(void.shape, np.int32)
+    found = []
+    parallel.run(
+        [lambda: found.append(_scan(void)), lambda: labels.fill(0)],
+        threads=threads if void.size > _LARGE else 1,
+        progress=Span(progress, 0, 0.3),
+    )
+    runs = found[0]
     void_of_run = np.empty(len(runs), np.int64)
     count = _labelling.join_runs(runs, void_of_run)
     checkpoint(progress, 0.6)
@@ -93,9 +106,6 @@ def find_voids(void, *, progress=SILENT):
     grouped = np.empty_like(runs)
     _labelling.group_runs(runs, void_of_run, first_run, grouped, cells)
     checkpoint(progress, 0.8)
-    # Not zeros(): NumPy asks for huge pages for this one, and the kernels jump from row to row.
-    labels = np.empty(void.shape, np.int32)
-    labels.fill(0)
     _labelling.paint(grouped, first_run, labels)
     checkpoint(progress, 1.0)
     return Voids(labels, grouped, first_run, cells)
