@@ -31,7 +31,7 @@ def draw(path, *, holed, void, filled, error, cell, title, caption):
     aspect = filled.shape[0] * cell[1] / (filled.shape[1] * cell[0])
     width = 5.0
     size = (count * width, 0.93 * aspect * width + 0.75)
-    figure, axes = plt.subplots(1, count, figsize=size, dpi=100, layout="constrained")
+    figure, axes = plt.subplots(1, count, figsize=size, dpi=85, layout="constrained")
     for axis, (name, image) in zip(axes, panels, strict=False):
         axis.imshow(image, aspect=cell[1] / cell[0], interpolation="lanczos")
         axis.set_title(name, fontsize=11)
