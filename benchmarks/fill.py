@@ -23,6 +23,7 @@ from osgeo import gdal, osr
 
 import demsmith
 from demsmith.core import raster
+from demsmith.core.raster.peer import gdal_fill
 from demsmith.core.voids.validation import errors_by_size, punch_voids
 
 gdal.UseExceptions()
@@ -119,23 +120,6 @@ def pooled(method, truth, masks):
                 squares[n] += error.rmse**2 * error.cells
                 cells[n] += error.cells
     return np.sqrt(squares / cells)
-
-
-def gdal_fill(values, void, *, smoothings=0):
-    """Fill by GDAL in memory, as its users do; give the result and the seconds of the fill."""
-    height, width = values.shape
-    memory = gdal.GetDriverByName("MEM")
-    data = memory.Create("", width, height, 1, gdal.GDT_Float32)
-    valid = memory.Create("", width, height, 1, gdal.GDT_Byte)
-    data.GetRasterBand(1).WriteRaster(
-        0, 0, width, height, np.where(void, 0, values).astype(np.float32).tobytes()
-    )
-    valid.GetRasterBand(1).WriteRaster(0, 0, width, height, (~void).astype(np.uint8).tobytes())
-    begin = time.perf_counter()
-    gdal.FillNodata(data.GetRasterBand(1), valid.GetRasterBand(1), 500, smoothings)
-    seconds = time.perf_counter() - begin
-    out = np.frombuffer(data.GetRasterBand(1).ReadRaster(), np.float32)
-    return out.reshape(values.shape), seconds
 
 
 # --- time and memory -----------------------------------------------------------------------------

@@ -168,8 +168,11 @@ def report(truth, void, filled, sizes, seconds, name, *, own=None, values=None):
     rows = [("Demsmith", errors_by_size(filled, truth, void))]
     holes = void if own is None else void | own
     if _has_gdal():
+        from demsmith.core.raster.peer import gdal_fill
+
         for title, smoothings in (("GDAL FillNodata", 0), ("GDAL, 2 smoothings", 2)):
-            theirs = gdal_fill(truth if values is None else values, holes, smoothings)
+            ground = truth if values is None else values
+            theirs, _ = gdal_fill(ground, holes, smoothings=smoothings)
             rows.append((title, errors_by_size(theirs, truth, void)))
     print_table(rows)
     error = np.where(void, filled.astype(float) - truth, np.nan)
@@ -185,22 +188,6 @@ def report(truth, void, filled, sizes, seconds, name, *, own=None, values=None):
         else f"Root mean square error {ours:.1f} m{against} on voids punched for the test.",
     )  # fmt: skip
     say(f"picture: {OUT / 'demo.png'}")
-
-
-def gdal_fill(values, void, smoothings):
-    """Fill by GDAL's FillNodata, search distance 500 cells, in memory."""
-    from osgeo import gdal
-
-    gdal.UseExceptions()
-    height, width = values.shape
-    memory = gdal.GetDriverByName("MEM")
-    data = memory.Create("", width, height, 1, gdal.GDT_Float32)
-    valid = memory.Create("", width, height, 1, gdal.GDT_Byte)
-    ground = np.where(void, 0, values).astype(np.float32)
-    data.GetRasterBand(1).WriteRaster(0, 0, width, height, ground.tobytes())
-    valid.GetRasterBand(1).WriteRaster(0, 0, width, height, (~void).astype(np.uint8).tobytes())
-    gdal.FillNodata(data.GetRasterBand(1), valid.GetRasterBand(1), 500, smoothings)
-    return np.frombuffer(data.GetRasterBand(1).ReadRaster(), np.float32).reshape(values.shape)
 
 
 def print_table(rows):
