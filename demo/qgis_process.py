@@ -35,16 +35,28 @@ def run(algorithm, parameters, *, folder):
     RuntimeError
         With what ``qgis_process`` said, if it failed.
     """
-    environment = _environment(Path(folder).resolve())
-    _enable(environment)
+    variables = environment(folder)
+    _enable(variables)
     said = _call(
-        environment, "--json", "run", algorithm,
+        variables, "--json", "run", algorithm,
         *(f"--{name}={value}" for name, value in parameters.items()),
     )  # fmt: skip
     return json.loads(said[said.index("{") :])["results"]
 
 
-def _environment(folder):
+def environment(folder):
+    """Give the environment variables of a QGIS that keeps all in ``folder``, with this checkout.
+
+    Parameters
+    ----------
+    folder : path
+        Made if it does not exist.
+
+    Returns
+    -------
+    dict
+    """
+    folder = Path(folder).resolve()
     plugins, runtime = folder / "plugins", folder / "runtime"
     plugins.mkdir(parents=True, exist_ok=True)
     runtime.mkdir(mode=0o700, exist_ok=True)
@@ -56,24 +68,25 @@ def _environment(folder):
         **os.environ,
         "HOME": str(folder),
         "XDG_RUNTIME_DIR": str(runtime),
+        "QGIS_CUSTOM_CONFIG_PATH": str(folder / "profile"),
         "QT_QPA_PLATFORM": "offscreen",
         "QGIS_PLUGINPATH": str(plugins),
         "PYTHONPATH": sysconfig.get_paths()["purelib"],
     }
 
 
-def _enable(environment):
+def _enable(variables):
     try:
-        _call(environment, "plugins", "enable", "demsmith")
+        _call(variables, "plugins", "enable", "demsmith")
     except RuntimeError as error:
         # A profile kept from an earlier run has it enabled, which QGIS counts as a failure.
         if "already enabled" not in str(error):
             raise
 
 
-def _call(environment, *arguments):
+def _call(variables, *arguments):
     done = subprocess.run(
-        [find(), *arguments], env=environment, capture_output=True, text=True, check=False
+        [find(), *arguments], env=variables, capture_output=True, text=True, check=False
     )
     if done.returncode:
         raise RuntimeError(f"qgis_process failed:\n{done.stdout}\n{done.stderr}")

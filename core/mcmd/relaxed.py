@@ -9,6 +9,8 @@ in tension", Geophysics 55), by successive over-relaxation. The sweeps double wi
 level while the points quarter, so the work stays proportional to the number of void cells.
 """
 
+from functools import partial
+
 import numpy as np
 
 from demsmith.core import parallel
@@ -95,24 +97,22 @@ def relax_voids(
 def _fill_small(values, voids, selected, starts, stencils, offsets, threads, progress):
     from demsmith.core.mcmd._relaxed import fill_voids
 
-    def task(span):
-        def fill():
-            fill_voids(
-                values, voids.labels, voids.runs, voids.first_run, selected[span], starts[span],
-                stencils, OMEGA, *offsets, FINEST_SWEEPS,
-            )  # fmt: skip
+    def fill(span):
+        fill_voids(
+            values, voids.labels, voids.runs, voids.first_run, selected[span], starts[span],
+            stencils, OMEGA, *offsets, FINEST_SWEEPS,
+        )  # fmt: skip
 
-        return fill
-
-    _over_spans(voids.cells[selected], task, threads, progress)
+    _over_spans(voids.cells[selected], fill, threads, progress)
 
 
-def _over_spans(cells, make_task, threads, progress):
+def _over_spans(cells, work, threads, progress):
+    """Call ``work`` with slices of the voids, side by side."""
     # Small enough for progress and an even load, large enough that starting one costs nothing.
     parts = max(4 * parallel.thread_count(threads), int(cells.sum()) // _SPAN)
     spans = parallel.even_spans(cells, parts)
     parallel.run(
-        [make_task(slice(begin, end)) for begin, end in spans],
+        [partial(work, slice(begin, end)) for begin, end in spans],
         weights=[cells[begin:end].sum() for begin, end in spans],
         threads=threads,
         progress=progress,
@@ -163,13 +163,10 @@ def _displace(values, voids, selected, displacement, offsets, threads, progress)
     sums = np.zeros(values.shape)
     amplitude = displacement.by_level()
 
-    def task(span):
-        def displace():
-            displace_voids(
-                values, voids.labels, voids.runs, voids.first_run, selected[span], sums,
-                amplitude, displacement.r_t, displacement.seed, *offsets,
-            )  # fmt: skip
+    def displace(span):
+        displace_voids(
+            values, voids.labels, voids.runs, voids.first_run, selected[span], sums,
+            amplitude, displacement.r_t, displacement.seed, *offsets,
+        )  # fmt: skip
 
-        return displace
-
-    _over_spans(voids.cells[selected], task, threads, progress)
+    _over_spans(voids.cells[selected], displace, threads, progress)

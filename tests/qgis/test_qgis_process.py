@@ -1,37 +1,23 @@
 """The plugin in the real `qgis_process`, as a user installs it."""
 
 import json
-import os
-import shutil
 import subprocess
-import sysconfig
-from pathlib import Path
 
 import numpy as np
 import pytest
+import qgis_process as finder  # the demo's
 from gdal_reading import read
 
-ROOT = Path(__file__).resolve().parents[2]
 VOID = -32768
 
 
 @pytest.fixture(scope="module")
 def qgis_process(tmp_path_factory):
     """Give a function that calls `qgis_process` with the checkout enabled as a plugin."""
-    # Debian's wrapper of this name adds a flag that its own program does not know.
-    program = shutil.which("qgis_process.bin") or shutil.which("qgis_process")
+    program = finder.find()
     if program is None:
         pytest.skip("qgis_process is not installed")
-    plugins = tmp_path_factory.mktemp("plugins")
-    (plugins / "demsmith").symlink_to(ROOT)
-    home = tmp_path_factory.mktemp("home")
-    environment = {
-        **os.environ,
-        "QGIS_CUSTOM_CONFIG_PATH": str(home),  # pytest-qgis sets it, to a folder that stays
-        "QGIS_PLUGINPATH": str(plugins),
-        "PYTHONPATH": sysconfig.get_path("purelib"),
-        "QT_QPA_PLATFORM": "offscreen",
-    }
+    environment = finder.environment(tmp_path_factory.mktemp("qgis"))
 
     def call(*arguments):
         return subprocess.run(
