@@ -10,8 +10,15 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "fill_voids": "demsmith.core.voids",
     "fill_file": "demsmith.core.voids",
+    "Maps": "demsmith.core.mcmd",
     "read_raster": "demsmith.core.raster",
     "write_raster": "demsmith.core.raster",
+    "Grid": "demsmith.core.raster",
+    "Samples": "demsmith.core.samples",
+    "from_samples": "demsmith.core.samples",
+    "samples_file": "demsmith.core.samples",
+    "thin": "demsmith.core.thinning",
+    "thin_file": "demsmith.core.thinning",
 }
 
 __all__ = ["__version__", *_PUBLIC]

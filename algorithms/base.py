@@ -12,7 +12,14 @@ from qgis.PyQt.QtCore import QUrl
 from qgis.PyQt.QtGui import QIcon
 
 from demsmith.algorithms import dependencies
-from demsmith.algorithms.parameters import tr
+from demsmith.algorithms.parameters import (
+    add,
+    creation_options,
+    number,
+    read_creation_options,
+    read_number,
+    tr,
+)
 from demsmith.algorithms.provider import ICON, ROOT
 
 
@@ -65,14 +72,20 @@ class Tool(QgsProcessingAlgorithm):
 
         try:
             return self.compute(parameters, context, feedback, _Progress(feedback))
-        except DemsmithError as error:
-            raise QgsProcessingException(str(error)) from error
         except ImportError as error:
             raise QgsProcessingException(
                 tr(
-                    "A library that Demsmith needs does not load: {}. To install it anew: {}"
-                ).format(error, dependencies.install_command(dependencies.REQUIREMENTS))
+                    "A library that this tool needs does not load: {}. To install what Demsmith "
+                    "needs: {}"
+                ).format(
+                    error,
+                    dependencies.install_command(
+                        (*dependencies.REQUIREMENTS, *dependencies.EXTRAS)
+                    ),
+                )
             ) from error
+        except DemsmithError as error:
+            raise QgsProcessingException(str(error)) from error
 
     def compute(self, parameters, context, feedback, progress):
         """Do the work in a worker thread and return the outputs by name."""
@@ -96,14 +109,43 @@ class Tool(QgsProcessingAlgorithm):
             if parameters.get(name):
                 raise QgsProcessingException(self.invalidRasterError(parameters, name))
             return None
-        if layer.providerType() != "gdal":
-            raise QgsProcessingException(
-                tr("{}: layer '{}' comes from '{}', not from a file; "
-                   "export it as GeoTIFF and use that").format(
-                    name, layer.name(), layer.providerType()
-                )
-            )  # fmt: skip
-        return _file_of(layer.source())
+        return file_of(layer, name)
+
+    def add_running(self):
+        """Declare how the tool runs and how rasters are written."""
+        add(self, number("THREADS", "Threads", kind=int, optional=True, minValue=1), advanced=True,
+            help_text="Threads that compute; not given: one for every core. "
+            "The result is the same.")  # fmt: skip
+        add(self, creation_options(), advanced=True,
+            help_text="Left empty: tiled and compressed.")  # fmt: skip
+
+    def read_running(self, parameters, context):
+        """Give the arguments of the core's file functions that say how the tool runs."""
+        return dict(
+            threads=read_number(self, "THREADS", parameters, context, kind=int),
+            overwrite=True,  # QGIS has asked the user
+            creation_options=read_creation_options(
+                self.parameterAsString(parameters, "CREATION_OPTIONS", context)
+            ),
+        )
+
+
+def file_of(layer, name):
+    """Name the file of a raster layer, given for parameter ``name``, as GDAL opens it.
+
+    Raises
+    ------
+    QgsProcessingException
+        If the layer is no file that GDAL can open, such as a WMS layer.
+    """
+    if layer.providerType() != "gdal":
+        raise QgsProcessingException(
+            tr("{}: layer '{}' comes from '{}', not from a file; "
+               "export it as GeoTIFF and use that").format(
+                name, layer.name(), layer.providerType()
+            )
+        )  # fmt: skip
+    return _without_additions(layer.source())
 
 
 def _why_unreadable(tool, parameters):
@@ -122,7 +164,7 @@ def _why_unreadable(tool, parameters):
     return ""
 
 
-def _file_of(source):
+def _without_additions(source):
     """Strip from a layer's source what QGIS adds to the name GDAL knows."""
     parts = QgsProviderRegistry.instance().decodeUri("gdal", source)
     if parts.get("openOptions"):

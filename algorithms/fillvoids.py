@@ -4,25 +4,21 @@ from qgis.core import (
     QgsProcessingException,
     QgsProcessingOutputNumber,
     QgsProcessingOutputString,
-    QgsProcessingParameterBand,
     QgsProcessingParameterFileDestination,
     QgsProcessingParameterRasterDestination,
-    QgsProcessingParameterRasterLayer,
-    QgsProcessingParameterString,
 )
 
 from demsmith.algorithms import styling
-from demsmith.algorithms.base import Tool, help_picture
+from demsmith.algorithms.base import help_picture
 from demsmith.algorithms.parameters import (
     add,
+    add_maps,
     add_options,
-    creation_options,
-    number,
-    read_creation_options,
-    read_number,
+    read_maps,
     read_options,
     tr,
 )
+from demsmith.algorithms.source import BandTool
 
 _HELP = """
 {picture}
@@ -37,7 +33,8 @@ looked at: give them here.</p>
 voids or to a size. The result has the type of the input, rounded, or 32-bit floating point.</p>
 <p><b>Method.</b> Constrained midpoint displacement (F. Belhadj, <i>Terrain modeling: a
 constrained fractal model</i>, 2007) with every generation relaxed to the smoothest surface
-through the known ground. Strength <i>r_s</i> above 0 adds natural roughness.</p>
+through the known ground. Strength <i>r_s</i> above 0 adds roughness, everywhere alike or, by
+maps of the parameters, from cell to cell.</p>
 <p><b>Besides.</b> The source map tells filled cells (1) from original ones (0) and
 voids left as they were (2). The report is
 a JSON file with the place, size and rim of every void.</p>
@@ -52,7 +49,7 @@ _FILLED_COUNTS = (
 )
 
 
-class FillVoids(Tool):
+class FillVoids(BandTool):
     """Fill the voids of a raster: `demsmith.core.voids.fill_file` in Processing."""
 
     def name(self):
@@ -90,28 +87,10 @@ class FillVoids(Tool):
         """Declare parameters and outputs."""
         from demsmith.core.voids.options import FillOptions
 
-        add(self, QgsProcessingParameterRasterLayer("INPUT", tr("Elevation model")),
-            help_text="Raster whose voids are filled. It is never changed.")  # fmt: skip
-        add(self, QgsProcessingParameterBand("BAND", tr("Band"), 1, "INPUT", optional=True),
-            help_text="The band that holds the elevations.")  # fmt: skip
-        add(self, QgsProcessingParameterString(
-                "NODATA", tr("More values that mean void"), optional=True),
-            help_text="Numbers, separated by commas: cells with these values are voids, besides "
-            "the band's nodata value.")  # fmt: skip
-        add(self, QgsProcessingParameterRasterLayer(
-                "MASK", tr("Mask of voids"), optional=True),
-            help_text="Raster of the same size: cells that are neither 0 nor nodata are voids.",
-            )  # fmt: skip
-        add(self, number("BELOW", "Void at or below", optional=True), advanced=True,
-            help_text="Cells with this value or a lower one are voids.")  # fmt: skip
-        add(self, number("ABOVE", "Void at or above", optional=True), advanced=True,
-            help_text="Cells with this value or a higher one are voids.")  # fmt: skip
+        self.add_source("Raster whose voids are filled. It is never changed.")
         add_options(self, FillOptions)
-        add(self, number("THREADS", "Threads", kind=int, optional=True, minValue=1), advanced=True,
-            help_text="Voids filled side by side; not given: one for every core. "
-            "The result is the same.")  # fmt: skip
-        add(self, creation_options(), advanced=True,
-            help_text="Left empty: tiled and compressed.")  # fmt: skip
+        add_maps(self)
+        self.add_running()
         self._declare_outputs()
 
     def _declare_outputs(self):
@@ -134,18 +113,15 @@ class FillVoids(Tool):
         if not fine:
             return False, message
         try:
-            self.raster_source(parameters, "INPUT", context)
-            self.raster_source(parameters, "MASK", context)
-            self._void_values(parameters, context)
+            read_maps(self, parameters, context)
         except QgsProcessingException as error:
             return False, str(error)
         return True, ""
 
     def prepareAlgorithm(self, parameters, context, feedback):
         """Look layers up here, in the main thread, where QGIS keeps them."""
-        self._input = self.raster_source(parameters, "INPUT", context)
-        self._mask = self.raster_source(parameters, "MASK", context)
-        return True
+        self._maps = read_maps(self, parameters, context)
+        return super().prepareAlgorithm(parameters, context, feedback)
 
     def compute(self, parameters, context, feedback, progress):
         """Fill the voids."""
@@ -156,21 +132,13 @@ class FillVoids(Tool):
         source_map = self.parameterAsOutputLayer(parameters, "SOURCE_MAP", context)
         report = self.parameterAsFileOutput(parameters, "REPORT", context)
         result = fill_file(
-            self._input,
-            output,
+            **self.read_source(parameters, context),
+            output=output,
             options=read_options(self, FillOptions, parameters, context),
-            band=self.parameterAsInt(parameters, "BAND", context),
-            nodata=self._void_values(parameters, context),
-            below=read_number(self, "BELOW", parameters, context),
-            above=read_number(self, "ABOVE", parameters, context),
-            mask=self._mask,
+            maps=self._maps,
             source_map=source_map or None,
             report=report or None,
-            threads=read_number(self, "THREADS", parameters, context, kind=int),
-            overwrite=True,  # QGIS has asked the user
-            creation_options=read_creation_options(
-                self.parameterAsString(parameters, "CREATION_OPTIONS", context)
-            ),
+            **self.read_running(parameters, context),
             progress=progress,
         )
         for warning in result.warnings:
@@ -180,6 +148,8 @@ class FillVoids(Tool):
                 result.voids, result.cells_filled, result.cells_unfilled
             )
         )
+        if result.tuning and result.tuning["accepted"]:
+            feedback.pushInfo(result.tuning["summary"])
         outputs = {name: getattr(result, field) for name, field, _ in _FILLED_COUNTS}
         outputs.update(OUTPUT=output, WARNINGS="\n".join(result.warnings))
         styling.style_terrain(output, context)
@@ -189,14 +159,3 @@ class FillVoids(Tool):
         if report:
             outputs["REPORT"] = report
         return outputs
-
-    def _void_values(self, parameters, context):
-        text = self.parameterAsString(parameters, "NODATA", context)
-        try:
-            return tuple(float(each) for each in text.split(",") if each.strip())
-        except ValueError:
-            raise QgsProcessingException(
-                tr("NODATA is '{}'; give numbers separated by commas, such as -9999, 0").format(
-                    text
-                )
-            ) from None

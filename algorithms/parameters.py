@@ -6,6 +6,7 @@ from qgis.core import (
     QgsProcessingParameterDefinition,
     QgsProcessingParameterEnum,
     QgsProcessingParameterNumber,
+    QgsProcessingParameterRasterLayer,
     QgsProcessingParameterString,
 )
 from qgis.PyQt.QtCore import QCoreApplication
@@ -35,6 +36,17 @@ def add(algorithm, parameter, *, help_text, advanced=False):
     if advanced:
         parameter.setFlags(parameter.flags() | QgsProcessingParameterDefinition.Flag.FlagAdvanced)
     algorithm.addParameter(parameter)
+
+
+def add_maps(tool):
+    """Add a raster for each of MCMD's parameters that may change from cell to cell."""
+    from demsmith.core.mcmd import MapFiles
+
+    for spec in _specifications(MapFiles):
+        layer = QgsProcessingParameterRasterLayer(
+            _parameter_name(spec), tr(spec.title), optional=True
+        )
+        add(tool, layer, help_text=spec.help, advanced=True)
 
 
 def number(name, title, *, kind=float, default=None, optional=False, **limits):
@@ -87,6 +99,28 @@ def read_options(algorithm, options_class, parameters, context):
     )
     validate(options)
     return options
+
+
+def read_maps(tool, parameters, context):
+    """Name the rasters of `add_maps` that were given; in the main thread, where layers are.
+
+    Returns
+    -------
+    dict of str to str
+        As the core's file functions take for ``maps``.
+
+    Raises
+    ------
+    QgsProcessingException
+        If a layer is no file that GDAL can open.
+    """
+    from demsmith.core.mcmd import MapFiles
+
+    files = {
+        spec.name: tool.raster_source(parameters, _parameter_name(spec), context)
+        for spec in _specifications(MapFiles)
+    }
+    return MapFiles(**files).paths()
 
 
 def read_number(algorithm, name, parameters, context, *, kind=float):

@@ -43,11 +43,23 @@ class DemsmithProvider(QgsProcessingProvider):
         """Rasters are written as GeoTIFF and nothing else."""
         return ["tif", "tiff"]
 
+    def supportedOutputVectorLayerExtensions(self):
+        """Points are written in these formats."""
+        return ["gpkg", "geojson", "csv"]
+
+    def supportsNonFileBasedOutput(self):
+        """Every output is a file: no layers in memory, in databases or in a GeoPackage of many."""
+        return False
+
     def loadAlgorithms(self):
         """Add the tools; none where Python is too old to read them."""
         if not dependencies.python_suffices():
             QgsMessageLog.logMessage(dependencies.problem(), "Demsmith", Qgis.MessageLevel.Warning)
             return
         from demsmith.algorithms.fillvoids import FillVoids
+        from demsmith.algorithms.reconstructfromsamples import ReconstructFromSamples
+        from demsmith.algorithms.thinraster import ThinRaster
 
         self.addAlgorithm(FillVoids())
+        self.addAlgorithm(ReconstructFromSamples())
+        self.addAlgorithm(ThinRaster())

@@ -44,6 +44,11 @@ def style_source_map(path, context):
     _attach(path, context, _Style, "source_map.qml")
 
 
+def style_sample_map(path, context):
+    """Give the layer of ``path`` the classes of a map of samples when it is loaded."""
+    _attach(path, context, _Style, "sample_map.qml")
+
+
 def _attach(path, context, style, name):
     if context.willLoadLayerOnCompletion(path):
         context.layerToLoadOnCompletionDetails(path).setPostProcessor(style(name))

@@ -1,15 +1,17 @@
 """Reading results back by GDAL alone, so that our reading does not test our writing."""
 
 import numpy as np
+from support import GDAL_TYPES
+
+_TYPES = {name: np.dtype(kind).type for kind, name in GDAL_TYPES.items()}
 
 
 def read(path):
     """Read a raster by GDAL alone; returns values, nodata, geotransform and type."""
     from osgeo import gdal
 
-    dataset = gdal.Open(path)
+    dataset = gdal.Open(str(path))
     band = dataset.GetRasterBand(1)
-    types = {"Int16": np.int16, "Float32": np.float32, "Byte": np.uint8}
-    kind = types[gdal.GetDataTypeName(band.DataType)]
+    kind = _TYPES[gdal.GetDataTypeName(band.DataType)]
     values = np.frombuffer(band.ReadRaster(), kind).reshape(band.YSize, band.XSize)
     return values, band.GetNoDataValue(), dataset.GetGeoTransform(), kind

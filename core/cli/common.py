@@ -7,11 +7,20 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter
 
+from demsmith.core.cli.parameters import parameters
 from demsmith.core.cli.progress import CommandProgress
+from demsmith.core.mcmd import MapFiles
 
 VERB = Group("Options", sort_key=1)
 SOURCE = Group("What is read", sort_key=2)
 RUN = Group("How it runs", sort_key=3)
+MCMD = Group(
+    "MCMD",
+    help="Constrained midpoint displacement (Belhadj 2007), with the paper's names.",
+    sort_key=4,
+)
+
+Maps = parameters(MapFiles, group=MCMD, advanced=MCMD)
 
 InputFile = Annotated[
     str,

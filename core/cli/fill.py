@@ -2,18 +2,13 @@
 
 from typing import Annotated
 
-from cyclopts import App, Group, Parameter
+from cyclopts import App, Parameter
 
-from demsmith.core.cli.common import VERB, InputFile, OutputFile, Run, Source
+from demsmith.core.cli.common import MCMD, VERB, InputFile, Maps, OutputFile, Run, Source
 from demsmith.core.cli.parameters import parameters
 from demsmith.core.voids import FillOptions, fill_file
 
-_MCMD = Group(
-    "MCMD",
-    help="Constrained midpoint displacement (Belhadj 2007), with the paper's names.",
-    sort_key=4,
-)
-_Options = parameters(FillOptions, group=VERB, advanced=_MCMD)
+_Options = parameters(FillOptions, group=VERB, advanced=MCMD)
 
 app = App(
     name="fill",
@@ -35,6 +30,7 @@ def fill(
     /,
     *,
     options: _Options = _Options(),  # noqa: B008, frozen
+    maps: Maps = Maps(),  # noqa: B008, frozen
     source_map: Annotated[
         str | None,
         Parameter(
@@ -51,7 +47,7 @@ def fill(
     """Fill the voids of a raster file."""
     with run.progress("filling voids") as progress:
         result = fill_file(
-            input, output, options=options, source_map=source_map, report=report,
+            input, output, options=options, maps=maps.paths(), source_map=source_map, report=report,
             band=source.band, nodata=source.nodata, below=source.below, above=source.above,
             mask=source.mask, threads=run.threads, overwrite=run.overwrite,
             creation_options=run.creation_option, progress=progress,
@@ -70,6 +66,8 @@ def _summary(result):
         )
     if result.cells_unfilled:
         done += f", left {_count(result.cells_unfilled, 'cell')} unfilled"
+    if result.tuning and result.tuning["accepted"]:
+        done += f", {result.tuning['summary']}"
     return f"{done} in {result.seconds:.1f} s -> {result.output}"
 
 

@@ -12,6 +12,8 @@ from demsmith.core.errors import Cancelled, DemsmithError
 
 _VERBS = {
     "fill": "Fill the voids (holes without data) of an elevation raster.",
+    "samples": "Make terrain from points, lines, contours, a sketch, or noise alone.",
+    "thin": "Keep only the cells that carry the shape, or a random share.",
 }
 
 

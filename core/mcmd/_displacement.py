@@ -3,6 +3,7 @@
 import numba
 import numpy as np
 
+from demsmith.core.mcmd._maps import value_at
 from demsmith.core.mcmd._points import coarsest_level
 
 _JIT = dict(nogil=True, cache=True, error_model="numpy")
@@ -26,9 +27,21 @@ def uniform(seed, row, column):
 
 
 @numba.njit(**_JIT)
-def displace_voids(
-    values, labels, runs, first_run, voids, sums, amplitude, shift, seed, row_offset, column_offset
-):
+def displacement(noise, r, row, column, i, j):
+    """Give the displacement of a midpoint of subdivision level ``r`` (equation 1).
+
+    Its parameters are those of the raster's cell ``(row, column)``, its random number that of the
+    lattice's point ``(i, j)``.
+    """
+    strength = value_at(noise.strength, row, column)
+    if strength == 0:
+        return 0.0
+    amplitude = strength * 2.0 ** (-2 * value_at(noise.h, row, column) * r)
+    return (uniform(noise.seed, i, j) + value_at(noise.r_t, row, column)) * amplitude
+
+
+@numba.njit(**_JIT)
+def displace_voids(values, labels, runs, first_run, voids, sums, noise, row_offset, column_offset):
     """Add the summed displacements of all levels to some filled voids, in place.
 
     Displacements descend as elevations do: a midpoint has the mean of its ascendants' and its
@@ -39,19 +52,16 @@ def displace_voids(
     ----------
     sums : (H, W) float64 array of zeros
         Where the displacements of each void's cells are summed.
-    amplitude : (levels,) float64 array
-        Largest displacement at each level [m], finest first.
-    shift : float
-        The paper's ``r_t``.
+    noise : Noise
     """
     for void in voids:
         a, b = first_run[void], first_run[void + 1]
-        for level in range(min(coarsest_level(runs, a, b), amplitude.size - 1), -1, -1):
+        for level in range(min(coarsest_level(runs, a, b), noise.levels - 1), -1, -1):
             # Centres of squares before midpoints of edges, which descend from them.
             for centres in (True, False):
                 _displace_level(
-                    labels, runs, a, b, void + 1, 1 << level, centres, sums,
-                    amplitude[level], shift, seed, row_offset, column_offset,
+                    labels, runs, a, b, void + 1, level, centres, sums, noise,
+                    row_offset, column_offset,
                 )  # fmt: skip
         for k in range(a, b):
             row = runs[k, 0]
@@ -61,8 +71,10 @@ def displace_voids(
 
 @numba.njit(**_JIT)
 def _displace_level(
-    labels, runs, a, b, own, step, centres, sums, amplitude, shift, seed, row_offset, column_offset
+    labels, runs, a, b, own, level, centres, sums, noise, row_offset, column_offset
 ):
+    step = 1 << level
+    r = noise.levels - level
     for k in range(a, b):
         row, start, stop = runs[k, 0], runs[k, 1], runs[k, 2]
         if (row + row_offset) % step:
@@ -75,7 +87,7 @@ def _displace_level(
                 continue
             if not _is_free(labels, row, column, own, step):
                 continue
-            here = (uniform(seed, row + row_offset, column + column_offset) + shift) * amplitude
+            here = displacement(noise, r, row, column, row + row_offset, column + column_offset)
             sums[row, column] = here + _inherited(labels, row, column, own, step, centres, sums)
 
 

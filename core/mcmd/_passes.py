@@ -2,12 +2,16 @@
 
 A lattice is an ``(S, S)`` array with ``S = 2**levels + 1``. A point's step is the largest power of
 two that divides both its indices; its ascendants are the points it is the midpoint of.
+
+``row`` and ``column`` are those of the lattice's first point in the raster, whose maps ``l`` and
+``l_bu`` are. The cell that receives an elevation is the one whose curve bends it, up as down.
 """
 
 import numba
 import numpy as np
 
-from demsmith.core.mcmd._displacement import uniform
+from demsmith.core.mcmd._displacement import displacement
+from demsmith.core.mcmd._maps import value_at
 
 _JIT = dict(nogil=True, cache=True, error_model="numpy")
 
@@ -17,12 +21,12 @@ _DIAGONAL = ((-1, -1), (1, 1), (-1, 1), (1, -1))
 
 
 @numba.njit(**_JIT)
-def curve(e, d, d_max, l):
-    """Give the paper's phi (equation 2) of an elevation above the datum at a distance."""
+def bend(d, d_max, l):
+    """Give the paper's phi (equation 2) at a distance, as a share of the elevation."""
     if l == 0:
-        return e
+        return 1.0
     fall = 1.0 - (1.0 - min(d / d_max, 1.0)) ** abs(l)
-    return e * (1.0 - fall) if l > 0 else e * (1.0 + fall)
+    return 1.0 - fall if l > 0 else 1.0 + fall
 
 
 @numba.njit(**_JIT)
@@ -50,7 +54,9 @@ def _ascendant(i, j, n, side, triangle):
 
 
 @numba.njit(**_JIT)
-def bottom_up_generation(z, known, active, sums, counts, triangle, l_bu, d_max, dx, dy):
+def bottom_up_generation(
+    z, known, active, sums, counts, triangle, l_bu, row, column, d_max, dx, dy
+):
     """Do one generation of Algorithm 1: unknown ascendants of the active points become known.
 
     ``sums`` and ``counts`` are zeros on entry and on return. Returns the points that became known.
@@ -66,7 +72,8 @@ def bottom_up_generation(z, known, active, sums, counts, triangle, l_bu, d_max, 
             if counts[ai, aj] == 0:
                 reached.append(ai * side + aj)
             d = np.hypot((ai - i) * dy[i], (aj - j) * dx[i])
-            sums[ai, aj] += curve(z[i, j], d, d_max, l_bu)
+            l = value_at(l_bu, ai + row, aj + column)
+            sums[ai, aj] += z[i, j] * bend(d, d_max, l)
             counts[ai, aj] += 1
     out = np.empty(len(reached), np.int64)
     for n in range(len(reached)):
@@ -93,7 +100,7 @@ def points_of(known):
 
 
 @numba.njit(**_JIT)
-def lift_level(z, known, step, centres, begin, end, triangle, l_bu, d_max, dx, dy):
+def lift_level(z, known, step, centres, begin, end, triangle, l_bu, row, column, d_max, dx, dy):
     """Give unknown ascendants the distance-weighted mean of their known children at ``step``.
 
     With ``centres``, the ascendants are the centres of squares of side ``2 * step`` and their
@@ -107,6 +114,7 @@ def lift_level(z, known, step, centres, begin, end, triangle, l_bu, d_max, dx, d
         for j in range(step if centres else 0, side, 2 * step):
             if known[i, j]:
                 continue
+            l = value_at(l_bu, i + row, j + column)
             total, weight = 0.0, 0.0
             for di in range(-1, 2):
                 for dj in range(-1, 2):
@@ -117,7 +125,7 @@ def lift_level(z, known, step, centres, begin, end, triangle, l_bu, d_max, dx, d
                     if ci < 0 or cj < 0 or ci >= side or cj >= side or not known[ci, cj]:
                         continue
                     d2 = (di * step * dy[i]) ** 2 + (dj * step * dx[i]) ** 2
-                    total += curve(z[ci, cj], np.sqrt(d2), d_max, l_bu) / d2
+                    total += z[ci, cj] * bend(np.sqrt(d2), d_max, l) / d2
                     weight += 1 / d2
             if weight > 0:
                 z[i, j] = total / weight
@@ -126,9 +134,8 @@ def lift_level(z, known, step, centres, begin, end, triangle, l_bu, d_max, dx, d
 
 @numba.njit(**_JIT)
 def descend_level(
-    z, known, step, centres, begin, end, triangle, l, d_max, dx, dy,
-    amplitude, shift, seed,
-):  # fmt: skip
+    z, known, step, centres, begin, end, triangle, l, row, column, d_max, dx, dy, noise, r
+):
     """Give unknown midpoints of a step the mean of their ascendants, displaced (equation 1).
 
     Rows ``begin`` to ``end`` in units of ``step``.
@@ -139,19 +146,27 @@ def descend_level(
         if centres and not i_odd:
             continue
         first = step if centres or not i_odd else 0
+        # A power for every ascendant would take longer than all else: there are but three
+        # distances in a row, and a curve seldom changes from cell to cell.
+        along, across, down = 1.0, 1.0, 1.0
+        bent_by = 0.0
         for j in range(first, side, 2 * step):
             if known[i, j]:
                 continue
+            own = value_at(l, i + row, j + column)
+            if own != bent_by:
+                bent_by = own
+                along = bend(step * dx[i], d_max, own)
+                across = bend(step * np.hypot(dx[i], dy[i]), d_max, own)
+                down = bend(step * dy[i], d_max, own)
             total, count = 0.0, 0
             for n in range(4):
                 ai, aj, exists = _ascendant(i, j, n, side, triangle)
                 if exists:
-                    d = np.hypot((ai - i) * dy[i], (aj - j) * dx[i])
-                    total += curve(z[ai, aj], d, d_max, l)
+                    total += z[ai, aj] * (across if centres else along if ai == i else down)
                     count += 1
             z[i, j] = total / count
-            if amplitude > 0:
-                z[i, j] += (uniform(seed, i, j) + shift) * amplitude
+            z[i, j] += displacement(noise, r, i + row, j + column, i, j)
 
 
 @numba.njit(**_JIT)

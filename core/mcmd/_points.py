@@ -196,11 +196,17 @@ def _mean_of_hidden_ground(values, labels, row, column, step):
         return np.nan
     height, width = labels.shape
     half = step // 2
-    # The last points before the raster's edge stand for all that is beyond them.
-    top = row - half if row >= step else 0
-    left = column - half if column >= step else 0
-    bottom = row + half + 1 if row + step < height else height
-    right = column + half + 1 if column + step < width else width
+    own = labels[row, column]
+    # The last points before the raster's edge or another void stand for all that is between.
+    top, left, bottom, right = row - half, column - half, row + half + 1, column + half + 1
+    if row < step or labels[row - step, column] != own:
+        top = max(row - step + 1, 0)
+    if column < step or labels[row, column - step] != own:
+        left = max(column - step + 1, 0)
+    if row + step >= height or labels[row + step, column] != own:
+        bottom = min(row + step, height)
+    if column + step >= width or labels[row, column + step] != own:
+        right = min(column + step, width)
     total, weight = 0.0, 0.0
     for r in range(top, bottom):
         for c in range(left, right):

@@ -9,8 +9,12 @@ import numpy as np
 
 from demsmith.core import parallel
 from demsmith.core.errors import InputError
+from demsmith.core.mcmd.displacement import Displacement
 from demsmith.core.mcmd.lattice import Lattice, metres
+from demsmith.core.mcmd.maps import as_map
 from demsmith.core.progress import SILENT, Span, checkpoint
+
+_NOTHING_KNOWN = "no cell is known; MCMD needs at least one elevation, or displacements"
 
 
 def bottom_up(values, known, *, variant="paper", l_bu=0.0, progress=SILENT, **surroundings):
@@ -25,8 +29,8 @@ def bottom_up(values, known, *, variant="paper", l_bu=0.0, progress=SILENT, **su
         ``paper`` takes plain means over all children active in a generation; ``weighted`` goes
         from the finest level up and weights children by their inverse squared distance, so that
         near ground counts more than far.
-    l_bu : float
-        Curve of the interpolation function.
+    l_bu : float or (H, W) array
+        Curve of the interpolation function; a map's is that of the ascendant.
     **surroundings
         ``scheme``, ``datum``, ``d_max``, ``pixel_size``, ``lattice``, ``threads`` as in
         `interpolate`.
@@ -45,6 +49,8 @@ def bottom_up(values, known, *, variant="paper", l_bu=0.0, progress=SILENT, **su
     >>> int(bottom_up(np.where(known, 7.0, 0.0), known)[1].sum())
     10
     """
+    if not known.any():
+        raise InputError(_NOTHING_KNOWN)
     pass_ = _Passes(values, known, **surroundings)
     pass_.bottom_up(variant, l_bu, progress)
     return pass_.raster()
@@ -63,11 +69,13 @@ def interpolate(
     values : (H, W) array
         Elevations [m]; only known cells are read.
     known : (H, W) bool array
-        At least one must be True.
+        At least one must be True, unless there are displacements: then terrain is made from them
+        alone, about the datum or 0.
     variant : {"paper", "weighted"}
         Bottom-up pass, see `bottom_up`.
-    l, l_bu : float
-        Curves of the top-down and bottom-up interpolation functions (equation 2).
+    l, l_bu : float or (H, W) array
+        Curves of the top-down and bottom-up interpolation functions (equation 2); a map's is that
+        of the cell that receives an elevation.
     displacement : Displacement, optional
         Noise of the top-down pass; default: none.
     scheme : {"triangle-edge", "diamond-square"}
@@ -91,13 +99,18 @@ def interpolate(
     Raises
     ------
     InputError
-        If no cell is known, the datum is above a known cell, or an option is out of range.
+        If no cell is known, the datum is above a known cell, or a map is of another shape.
     Cancelled
         If ``progress`` asks to stop.
     """
     pass_ = _Passes(values, known, **surroundings)
-    pass_.bottom_up(variant, l_bu, Span(progress, 0, 0.5))
-    pass_.fix_corners()
+    if known.any():
+        pass_.bottom_up(variant, l_bu, Span(progress, 0, 0.5))
+        pass_.fix_corners()
+    elif displacement is None:
+        raise InputError(_NOTHING_KNOWN)
+    else:
+        pass_.displace_corners(displacement)
     pass_.top_down(l, displacement, Span(progress, 0.5, 1))
     return pass_.raster()[0]
 
@@ -109,17 +122,16 @@ class _Passes:
         self, values, known, *, scheme="triangle-edge", datum=None, d_max=None, pixel_size=None,
         lattice=None, threads=None,
     ):  # fmt: skip
-        if not known.any():
-            raise InputError("no cell is known; MCMD needs at least one elevation")
         self.shape = values.shape
         self.threads = threads
         self.triangle = scheme == "triangle-edge"
         self.lattice = lattice or Lattice.covering(values.shape)
+        self.origin = self.lattice.row, self.lattice.column
         row, column = -self.lattice.row, -self.lattice.column
         self.window = (slice(row, row + values.shape[0]), slice(column, column + values.shape[1]))
-        lowest = float(values[known].min())
-        self.datum = lowest if datum is None else float(datum)
-        if self.datum > lowest:
+        lowest = float(values[known].min()) if known.any() else None
+        self.datum = float(datum if datum is not None else lowest or 0)
+        if lowest is not None and self.datum > lowest:
             raise InputError(f"datum {self.datum:g} m is above the lowest known cell {lowest:g} m")
         side = self.lattice.side
         if row < 0 or column < 0 or side < row + values.shape[0] or side < column + values.shape[1]:
@@ -140,6 +152,7 @@ class _Passes:
         return self.z[self.window] + self.datum, self.known[self.window].copy()
 
     def bottom_up(self, variant, l_bu, progress):
+        l_bu = as_map(l_bu, self.shape)
         if variant == "paper":
             self._bottom_up_paper(l_bu, progress)
         else:
@@ -155,8 +168,8 @@ class _Passes:
         while active.size:
             checkpoint(progress, generation / (generation + self.lattice.levels + 1))
             active = bottom_up_generation(
-                self.z, self.known, active, sums, counts, self.triangle, l_bu, self.d_max,
-                self.dx, self.dy,
+                self.z, self.known, active, sums, counts, self.triangle, l_bu,
+                *self.origin, self.d_max, self.dx, self.dy,
             )  # fmt: skip
             generation += 1
 
@@ -168,8 +181,8 @@ class _Passes:
             part = Span(progress, 1 - 0.25**level, 1 - 0.25 ** (level + 1))
             for centres, half in ((False, part),) if self.triangle else _halves(part):
                 self._over_rows(
-                    lift_level, level, centres, half, self.triangle, l_bu, self.d_max,
-                    self.dx, self.dy,
+                    lift_level, level, centres, half, self.triangle, l_bu,
+                    *self.origin, self.d_max, self.dx, self.dy,
                 )  # fmt: skip
 
     def fix_corners(self):
@@ -182,20 +195,29 @@ class _Passes:
         for corner, elevation in zip(corners, found, strict=True):
             self.z[corner] = elevation
 
+    def displace_corners(self, displacement):
+        """Give the lattice's corners random elevations about the datum: nothing is known."""
+        from demsmith.core.mcmd._displacement import displacement as displaced
+
+        noise = displacement.noise(self.shape)
+        row, column = self.origin
+        for i in (0, self.lattice.side - 1):
+            for j in (0, self.lattice.side - 1):
+                self.z[i, j] = displaced(noise, 0, i + row, j + column, i, j)
+                self.known[i, j] = True
+
     def top_down(self, l, displacement, progress):  # noqa: E741
         from demsmith.core.mcmd._passes import descend_level
 
-        amplitude = np.zeros(self.lattice.levels)
-        shift, seed = 0.0, 0
-        if displacement is not None:
-            amplitude = displacement.by_level()
-            shift, seed = displacement.r_t, displacement.seed
-        for level in range(self.lattice.levels - 1, -1, -1):
+        levels = self.lattice.levels
+        noise = (displacement or Displacement(0, 0, 0, 0, levels)).noise(self.shape)
+        l = as_map(l, self.shape)  # noqa: E741
+        for level in range(levels - 1, -1, -1):
             part = Span(progress, 0.25 ** (level + 1), 0.25**level)
             for centres, half in _halves(part):
                 self._over_rows(
-                    descend_level, level, centres, half, self.triangle, l, self.d_max,
-                    self.dx, self.dy, amplitude[level], shift, seed,
+                    descend_level, level, centres, half, self.triangle, l,
+                    *self.origin, self.d_max, self.dx, self.dy, noise, noise.levels - level,
                 )  # fmt: skip
 
     def _over_rows(self, kernel, level, centres, progress, *parameters):

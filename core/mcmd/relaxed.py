@@ -91,7 +91,7 @@ def relax_voids(
     )  # fmt: skip
     if displacement is not None:
         rest = Span(progress, 0.7, 1)
-        _displace(values, voids, selected, displacement, offsets, threads, rest)
+        displace(values, voids, selected, displacement, offsets, threads, rest)
 
 
 def _fill_small(values, voids, selected, starts, stencils, offsets, threads, progress):
@@ -157,16 +157,35 @@ def _fill_one(values, voids, void, start, stencils, offsets, progress):
         done += 0.5 ** (level + 1)
 
 
-def _displace(values, voids, selected, displacement, offsets, threads, progress):
+def displace(values, voids, selected, displacement, offsets, threads=None, progress=SILENT):
+    """Add random roughness that dies away at the rim to filled voids, in place.
+
+    Parameters
+    ----------
+    values : (H, W) float32 or float64 array, C order
+    voids : demsmith.core.voids.Voids
+    selected : (N,) int array
+        The numbers of the voids.
+    displacement : Displacement
+    offsets : (int, int)
+        Added to a cell's row and column they count from the lattice's corner.
+    threads : int, optional
+    progress : Progress
+
+    Raises
+    ------
+    Cancelled
+        If ``progress`` asks to stop; ``values`` is then half displaced.
+    """
     from demsmith.core.mcmd._displacement import displace_voids
 
     sums = np.zeros(values.shape)
-    amplitude = displacement.by_level()
+    noise = displacement.noise(values.shape)
 
-    def displace(span):
+    def add(span):
         displace_voids(
             values, voids.labels, voids.runs, voids.first_run, selected[span], sums,
-            amplitude, displacement.r_t, displacement.seed, *offsets,
+            noise, *offsets,
         )  # fmt: skip
 
-    _over_spans(voids.cells[selected], displace, threads, progress)
+    _over_spans(voids.cells[selected], add, threads, progress)

@@ -17,7 +17,7 @@ from demsmith.core.errors import DependencyError
 
 @functools.cache
 def load():
-    """Import GDAL's bindings; a namespace with ``gdal`` and ``osr``.
+    """Import GDAL's bindings; a namespace with ``gdal``, ``ogr`` and ``osr``.
 
     Raises
     ------
@@ -25,14 +25,14 @@ def load():
         If they are missing.
     """
     try:
-        from osgeo import gdal, osr
+        from osgeo import gdal, ogr, osr
     except ImportError as error:
         raise DependencyError(
             f"GDAL's Python bindings are missing ({error}): on Debian or Ubuntu install "
             "python3-gdal and make the environment with "
             "/usr/bin/python3 -m venv --system-site-packages; elsewhere run inside QGIS's Python"
         ) from None
-    return SimpleNamespace(gdal=gdal, osr=osr)
+    return SimpleNamespace(gdal=gdal, ogr=ogr, osr=osr)
 
 
 class Session:
@@ -73,7 +73,7 @@ def session(**config):
     gdal = osgeo.gdal
     heard = Session(gdal)
     with contextlib.ExitStack() as stack:
-        for module in (gdal, osgeo.osr):
+        for module in (gdal, osgeo.ogr, osgeo.osr):
             # From GDAL 3.7 on the choice is per thread; before, `attempt` copes with both.
             if hasattr(module, "ExceptionMgr"):
                 stack.enter_context(module.ExceptionMgr(useExceptions=False))

@@ -1,14 +1,18 @@
-"""What a coordinate reference system says of lengths and heights."""
+"""What a coordinate reference system says of lengths and heights, and ways from one to another."""
 
 import functools
 from dataclasses import dataclass
 
+import numpy as np
+
 from demsmith.core.errors import InputError
 from demsmith.core.geodesy import WGS84, Ellipsoid
+from demsmith.core.progress import SILENT, checkpoint
 from demsmith.core.raster._gdal import load, session
 
 # Known without GDAL, so that arrays in degrees can be worked on where it is missing.
 _PLAIN_WGS84 = ("EPSG:4326", "OGC:CRS84")
+_PLACES_AT_ONCE = 100_000
 
 
 @dataclass(frozen=True)
@@ -60,9 +64,7 @@ def crs_units(crs):
     if crs.upper() in _PLAIN_WGS84:
         return CrsUnits(geographic=True)
     with session() as heard:
-        reference = load().osr.SpatialReference()
-        if heard.attempt(reference.SetFromUserInput, crs) != 0:
-            raise InputError(f"the CRS cannot be understood ({heard.reason}): {crs[:80]}")
+        reference = spatial_reference(crs, heard)
         if reference.IsGeocentric():
             raise InputError("the CRS is geocentric; reproject the raster to a map first")
         geographic = bool(reference.IsGeographic())
@@ -77,6 +79,73 @@ def crs_units(crs):
             mercator=(reference.GetAttrValue("PROJECTION") or "").startswith("Mercator")
             or "Pseudo-Mercator" in reference.GetName(),
         )
+
+
+def reproject(xy, source, target, *, progress=SILENT):
+    """Bring places from one CRS to another.
+
+    Parameters
+    ----------
+    xy : ndarray of float64, shape (N, 2)
+        Easting or longitude first, whatever order the CRS itself prescribes.
+    source, target : str
+        WKT, or anything else GDAL takes.
+    progress : Progress
+        Told how many are done.
+
+    Returns
+    -------
+    ndarray of float64, shape (N, 2)
+        NaN for places that the target CRS does not reach.
+
+    Raises
+    ------
+    InputError
+        If a CRS cannot be understood, or there is no way from one to the other.
+    Cancelled
+        If ``progress`` says so.
+    """
+    osr = load().osr
+    with session() as heard:
+        there = spatial_reference(target, heard)
+        here = spatial_reference(source, heard)
+        if here.IsSame(there):
+            return xy
+        way = heard.attempt(osr.CoordinateTransformation, here, there)
+        if way is None or heard.failures:
+            raise InputError(f"cannot reproject from its CRS to the one asked: {heard.reason}")
+        moved = np.empty_like(xy)
+        for start in range(0, len(xy), _PLACES_AT_ONCE):
+            checkpoint(progress, start / len(xy))
+            block = slice(start, start + _PLACES_AT_ONCE)
+            moved[block] = _transformed(way, xy[block].tolist(), heard)
+        moved[~np.isfinite(moved).all(axis=1)] = np.nan
+        return moved
+
+
+def _transformed(way, places, heard):
+    """Bring some places along; infinite or NaN where that cannot be."""
+    moved = heard.attempt(way.TransformPoints, places)
+    if moved is None:  # where exceptions are on, one place out of reach stops them all
+        nowhere = (np.nan, np.nan)
+        moved = [heard.attempt(way.TransformPoint, *place) or nowhere for place in places]
+    return [place[:2] for place in moved]
+
+
+def spatial_reference(crs, heard):
+    """Make GDAL's object of a CRS, easting or longitude first, inside a GDAL session.
+
+    Raises
+    ------
+    InputError
+        If the text is no CRS.
+    """
+    osr = load().osr
+    reference = osr.SpatialReference()
+    if heard.attempt(reference.SetFromUserInput, crs) != 0:
+        raise InputError(f"the CRS cannot be understood ({heard.reason}): {crs[:80]}")
+    reference.SetAxisMappingStrategy(osr.OAMS_TRADITIONAL_GIS_ORDER)
+    return reference
 
 
 def _degrees(radians):

@@ -79,6 +79,44 @@ class Grid:
         object.__setattr__(self, "shape", shape)
         object.__setattr__(self, "geotransform", geotransform)
 
+    @classmethod
+    def of_extent(cls, extent, resolution, crs=""):
+        """Make the north-up grid whose cells cover an extent, from its north-western corner on.
+
+        Parameters
+        ----------
+        extent : (xmin, ymin, xmax, ymax)
+            In the coordinates of ``crs``. Where it is no whole number of cells, the grid reaches
+            beyond its eastern and southern edges.
+        resolution : float or (float, float)
+            Width and height of a cell, in the same units.
+        crs : str
+            As in `Grid`.
+
+        Raises
+        ------
+        InputError
+            If the extent is empty or the resolution no positive number.
+
+        Examples
+        --------
+        >>> Grid.of_extent((0, 0, 95, 30), 10).shape
+        Shape(rows=3, columns=10)
+        """
+        xmin, ymin, xmax, ymax = (float(edge) for edge in extent)
+        width, height = (float(side) for side in np.broadcast_to(resolution, 2))
+        if not (math.isfinite(xmax - xmin) and math.isfinite(ymax - ymin)):
+            raise InputError(f"the extent ({xmin}, {ymin}, {xmax}, {ymax}) is not finite")
+        if xmin >= xmax or ymin >= ymax:
+            raise InputError(
+                f"the extent from ({xmin}, {ymin}) to ({xmax}, {ymax}) is empty: "
+                "give xmin, ymin, xmax, ymax"
+            )
+        if not (0 < width < math.inf and 0 < height < math.inf):
+            raise InputError(f"the resolution {width} × {height} must be positive")
+        shape = Shape(_cells_covering(ymax - ymin, height), _cells_covering(xmax - xmin, width))
+        return cls(shape, (xmin, width, 0.0, ymax, 0.0, -height), crs)
+
     @property
     def south_up(self):
         """Whether the first row is the southern one."""
@@ -155,6 +193,11 @@ class Grid:
     def _pixel_in(self, units):
         """Width and height of a pixel in the degrees or metres that ``units`` speaks of."""
         return abs(self.geotransform[1]) * units.unit, abs(self.geotransform[5]) * units.unit
+
+
+def _cells_covering(length, side):
+    """Count cells; what is beyond a whole number by rounding only makes none of its own."""
+    return max(1, math.ceil(length / side - 1e-6))
 
 
 def _check_geotransform(geotransform, shape):

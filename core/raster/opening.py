@@ -76,11 +76,7 @@ def files_of(path):
 @contextlib.contextmanager
 def _openable(path):
     """Yield the name by which GDAL opens ``path``."""
-    if not _is_virtual(path):
-        if not os.path.exists(path):
-            raise InputError(f"'{path}' does not exist")
-        if os.path.isfile(path) and os.path.getsize(path) == 0:
-            raise InputError(f"'{path}' is empty")
+    check_there(path)
     if archive.is_zip(path):
         with archive.openable(path) as name:
             yield name
@@ -89,6 +85,22 @@ def _openable(path):
             yield name
     else:
         yield path
+
+
+def check_there(path):
+    """Refuse a path at which there is nothing, or an empty file.
+
+    Raises
+    ------
+    InputError
+        Unless the path means something to GDAL only.
+    """
+    if _is_virtual(path):
+        return
+    if not os.path.exists(path):
+        raise InputError(f"'{path}' does not exist")
+    if os.path.isfile(path) and os.path.getsize(path) == 0:
+        raise InputError(f"'{path}' is empty")
 
 
 def _is_virtual(path):

@@ -4,12 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from demsmith.core.elevations import checked
 from demsmith.core.errors import InputError
-from demsmith.core.mcmd import Displacement, Lattice, interpolate, relax_voids
+from demsmith.core.mcmd import Lattice, Maps, displacement_of, interpolate, relax_voids
 from demsmith.core.options import validate
 from demsmith.core.progress import SILENT, Span
 from demsmith.core.voids.labelling import Rims, Voids, find_voids, survey_rims
 from demsmith.core.voids.options import FillOptions
+from demsmith.core.voids.roughness import Roughness, roughen
 
 ORIGINAL, FILLED, LEFT = 0, 1, 2
 """What a source map says of a cell: known before, filled, or a void that was left as it was."""
@@ -30,12 +32,18 @@ class Filled:
     rims : Rims
     selected : (N,) int64 array
         The numbers of the voids that were filled.
+    roughness : Roughness or None
+        What natural roughness the voids were given, if any was asked for.
+    tuned : demsmith.core.tuning.Tuned or None
+        What tuning found, if it was asked for and there are voids.
     """
 
     values: np.ndarray
     voids: Voids
     rims: Rims
     selected: np.ndarray
+    roughness: Roughness | None = None
+    tuned: object = None
 
     @property
     def cells_filled(self):
@@ -68,6 +76,7 @@ def fill_voids(
     void=None,
     *,
     options=None,
+    maps=None,
     pixel_size=None,
     lattice=None,
     d_max=None,
@@ -87,6 +96,8 @@ def fill_voids(
         those of a masked array where this is not given.
     options : FillOptions, optional
         How to fill; its fields can as well be given as keywords of their own.
+    maps : Maps, optional
+        Options that change from cell to cell: ``l``, ``l_bu``, ``h``, ``r_s`` and ``r_t``.
     pixel_size : float, (float, float) or (array, array), optional
         Ground metres per cell: both ways, or east-west and north-south, each one number or one by
         row. Default: 1.
@@ -126,22 +137,40 @@ def fill_voids(
     6
     """
     options = _options(options, parameters)
-    values, void = _checked(values, void)
+    values, void = checked(values, void)
+    tuned = None
+    if options.tune and void.any():
+        from demsmith.core.tuning import tune_fill  # which fills
+
+        tuned = tune_fill(
+            values, void, options=options, maps=maps, pixel_size=pixel_size, d_max=d_max,
+            threads=threads, progress=Span(progress, 0, 0.9),
+        )  # fmt: skip
+        options, progress = tuned.options, Span(progress, 0.9, 1)
+    by_cell = (maps or Maps()).over(options, values.shape)
+    _refuse_contradictions(options, by_cell)
     voids = find_voids(void, threads=threads, progress=Span(progress, 0, 0.1))
     if voids.cells.sum() == void.size:
         raise InputError("every cell is a void; there is nothing to fill from")
     work, out = _working_array(values, out, options)
     rims = survey_rims(work, void, voids, threads=threads, progress=Span(progress, 0.1, 0.2))
     selected = _selected(voids, rims, options)
+    lattice = lattice or Lattice.covering(values.shape)
     fill = _fill_relaxed if options.variant == "relaxed" else _fill_by_passes
+    filled = 0.5 if options.natural_roughness else 1
     fill(
-        work, values, void, voids, rims, selected, options,
-        lattice=lattice or Lattice.covering(values.shape), pixel_size=pixel_size, d_max=d_max,
-        threads=threads, progress=Span(progress, 0.2, 1),
+        work, values, void, voids, rims, selected, options, by_cell, lattice=lattice,
+        pixel_size=pixel_size, d_max=d_max, threads=threads, progress=Span(progress, 0.2, filled),
     )  # fmt: skip
+    roughness = None
+    if options.natural_roughness:
+        roughness = roughen(
+            work, voids, selected, seed=options.seed, offsets=(-lattice.row, -lattice.column),
+            threads=threads, progress=Span(progress, filled, 1),
+        )  # fmt: skip
     if work is not out:
         _copy_cells(work, voids, selected, out)
-    return Filled(out, voids, rims, selected)
+    return Filled(out, voids, rims, selected, roughness, tuned)
 
 
 def _options(options, parameters):
@@ -153,35 +182,18 @@ def _options(options, parameters):
     elif parameters:
         raise InputError(f"give options or {', '.join(parameters)}, not both")
     validate(options)
-    if options.variant == "relaxed" and (options.l or options.l_bu):
-        raise InputError(
-            "l and l_bu bend the variants 'weighted' and 'paper'; 'relaxed' has no such curve"
-        )
     return options
 
 
-def _checked(values, void):
-    masked = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else False
-    values = np.asarray(values)
-    if values.ndim != 2 or 0 in values.shape:
-        raise InputError(f"values has shape {values.shape}; give a 2-D array of elevations")
-    if values.dtype.kind not in "iuf":
-        raise InputError(f"values is of type {values.dtype}; give integers or real numbers")
-    void = np.broadcast_to(masked, values.shape) if void is None else np.asarray(void)
-    if void.shape != values.shape:
-        raise InputError(f"void has shape {void.shape}, values {values.shape}")
-    void = np.ascontiguousarray(void.astype(bool, copy=False))
-    if values.dtype.kind == "f" and _hides_unknown(values, void):
-        void = void | ~np.isfinite(values)
-    return values, void
-
-
-def _hides_unknown(values, void):
-    """Tell whether a cell that is not finite is no void."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        if np.isfinite(values.sum()):  # a sum is finite only if all its terms are, and quick
-            return False
-    return bool(np.less(np.isfinite(values), ~void).any())
+def _refuse_contradictions(options, by_cell):
+    if options.variant == "relaxed" and (np.any(by_cell.l) or np.any(by_cell.l_bu)):
+        raise InputError(
+            "l and l_bu bend the variants 'weighted' and 'paper'; 'relaxed' has no such curve"
+        )
+    if options.natural_roughness and np.any(by_cell.r_s):
+        raise InputError(
+            "natural_roughness finds the displacements that r_s would set; give one of them"
+        )
 
 
 def _working_array(values, out, options):
@@ -216,38 +228,29 @@ def _selected(voids, rims, options):
 
 
 def _fill_relaxed(
-    work, values, void, voids, rims, selected, options, *, lattice, pixel_size, d_max, threads,
-    progress,
+    work, values, void, voids, rims, selected, options, by_cell, *, lattice, pixel_size, d_max,
+    threads, progress,
 ):  # fmt: skip
     # d_max belongs to the curves, which this variant does not have.
     relax_voids(
         work, voids, selected, rims.mean[selected], pixel_size=pixel_size,
-        tension=options.tension, displacement=_displacement(values, void, lattice, options),
+        tension=options.tension,
+        displacement=displacement_of(options, by_cell, values, ~void, lattice),
         lattice=lattice, threads=threads, progress=progress,
     )  # fmt: skip
 
 
 def _fill_by_passes(
-    work, values, void, voids, rims, selected, options, *, lattice, pixel_size, d_max, threads,
-    progress,
+    work, values, void, voids, rims, selected, options, by_cell, *, lattice, pixel_size, d_max,
+    threads, progress,
 ):  # fmt: skip
     filled = interpolate(
-        values, ~void, variant=options.variant, scheme=options.scheme, l=options.l,
-        l_bu=options.l_bu, datum=options.datum, d_max=d_max,
-        displacement=_displacement(values, void, lattice, options), pixel_size=pixel_size,
-        lattice=lattice, threads=threads, progress=progress,
+        values, ~void, variant=options.variant, scheme=options.scheme, l=by_cell.l,
+        l_bu=by_cell.l_bu, datum=options.datum, d_max=d_max,
+        displacement=displacement_of(options, by_cell, values, ~void, lattice),
+        pixel_size=pixel_size, lattice=lattice, threads=threads, progress=progress,
     )  # fmt: skip
     _copy_cells(filled, voids, selected, work)
-
-
-def _displacement(values, void, lattice, options):
-    if options.r_s == 0:
-        return None
-    relief = options.relief
-    if relief is None:
-        known = values[~void]
-        relief = float(known.max()) - float(known.min())
-    return Displacement(options.r_s * relief, options.h, options.r_t, options.seed, lattice.levels)
 
 
 def _copy_cells(source, voids, selected, target):

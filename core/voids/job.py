@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, fields, replace
 import demsmith
 from demsmith.core import raster
 from demsmith.core.errors import InputError
+from demsmith.core.mcmd import read_maps
 from demsmith.core.options import validate
 from demsmith.core.progress import SILENT, Span, checkpoint
 from demsmith.core.voids.filling import FILLED, LEFT, ORIGINAL, fill_voids
@@ -37,6 +38,8 @@ class FillResult:
     voids, cells, cells_void, cells_filled, cells_unfilled, largest_void : int
         Number of voids found, of cells in all, in voids, filled and left, and of cells of the
         largest void.
+    tuning : dict or None
+        What tuning found, if it was asked for: `demsmith.core.tuning.Tuned.as_dict`.
     warnings : tuple of str
         One sentence each.
     table : VoidTable
@@ -53,6 +56,7 @@ class FillResult:
     cells_filled: int
     cells_unfilled: int
     largest_void: int
+    tuning: dict | None
     warnings: tuple
     table: VoidTable
 
@@ -64,8 +68,8 @@ class FillResult:
 
 
 def fill_file(
-    input, output, *, options=None, band=1, nodata=(), below=None, above=None, mask=None,  # noqa: A002
-    source_map=None, report=None, threads=None, overwrite=False, creation_options=(),
+    input, output, *, options=None, maps=None, band=1, nodata=(), below=None, above=None,  # noqa: A002
+    mask=None, source_map=None, report=None, threads=None, overwrite=False, creation_options=(),
     progress=SILENT,
 ):  # fmt: skip
     """Fill the voids of a raster file.
@@ -81,6 +85,9 @@ def fill_file(
         GeoTIFF with the voids filled, in the input's data type unless
         ``options.float_output``.
     options : FillOptions, optional
+    maps : mapping of str to path, optional
+        Rasters on the input's grid of options that change from cell to cell, such as
+        ``{"r_s": "rough.tif"}``; see `demsmith.core.mcmd.Maps`.
     source_map : path, optional
         GeoTIFF of bytes: 0 original, 1 filled, 2 a void left as it was.
     report : path, optional
@@ -100,7 +107,8 @@ def fill_file(
     Raises
     ------
     InputError
-        If the input cannot be used, has nothing but voids, or an option is out of range.
+        If the input cannot be used, has nothing but voids, a map does not fit, or an option is
+        out of range.
     OutputError
         If an output cannot be written.
     Cancelled
@@ -109,12 +117,15 @@ def fill_file(
     begin = time.perf_counter()
     options = options or FillOptions()
     validate(options)
-    paths = _checked_outputs(input, mask, output, source_map, report, overwrite)
+    maps = {name: os.fspath(path) for name, path in (maps or {}).items()}
+    inputs = [path for path in (input, mask, *maps.values()) if path is not None]
+    paths = _checked_outputs(inputs, output, source_map, report, overwrite)
     source = raster.read(
         input, band=band, nodata=nodata, below=below, above=above, mask=mask,
-        progress=Span(progress, 0, 0.15),
+        progress=Span(progress, 0, 0.1),
     )  # fmt: skip
-    filled = _fill(source, options, threads, Span(progress, 0.15, 0.8))
+    read = read_maps(maps, source.grid, progress=Span(progress, 0.1, 0.15))
+    filled = _fill(source, options, read, threads, Span(progress, 0.15, 0.8))
     result = _result(source, filled, paths, begin)
     checkpoint(progress, 0.8)
     left = filled.left()
@@ -138,13 +149,12 @@ def fill_file(
             )  # fmt: skip
         result = replace(result, seconds=round(time.perf_counter() - begin, 3))
         if report:
-            _write_report(part["report"], result, options, input, band)
+            _write_report(part["report"], result, options, maps, input, band)
         checkpoint(progress, 1.0)
     return result
 
 
-def _checked_outputs(source, mask, output, source_map, report, overwrite):
-    inputs = [path for path in (source, mask) if path is not None]
+def _checked_outputs(inputs, output, source_map, report, overwrite):
     raster.check_output(output, inputs=inputs, overwrite=overwrite)
     if source_map:
         raster.check_output(source_map, inputs=inputs, overwrite=overwrite)
@@ -158,7 +168,7 @@ def _checked_outputs(source, mask, output, source_map, report, overwrite):
     return paths
 
 
-def _fill(source, options, threads, progress):
+def _fill(source, options, maps, threads, progress):
     meta = source.meta
     # The options speak of real elevations, the cells of stored ones.
     stored = replace(
@@ -168,8 +178,8 @@ def _fill(source, options, threads, progress):
     )
     try:
         return fill_voids(
-            source.values, source.void, options=stored, pixel_size=source.grid.pixel_size_m(),
-            threads=threads, progress=progress,
+            source.values, source.void, options=stored, maps=maps,
+            pixel_size=source.grid.pixel_size_m(), threads=threads, progress=progress,
         )  # fmt: skip
     except InputError as error:
         raise InputError(f"'{source.source}': {error}") from None
@@ -180,6 +190,8 @@ def _result(source, filled, paths, begin):
     warnings = list(source.notes)
     if not cells.size:
         warnings.append(f"'{source.source}' has no voids; its elevations are written as they are")
+    if filled.tuned and not filled.tuned.accepted:
+        warnings.append(f"'{source.source}': {filled.tuned.summary()}")
     return FillResult(
         **paths,
         seconds=time.perf_counter() - begin,
@@ -190,17 +202,19 @@ def _result(source, filled, paths, begin):
         cells_filled=filled.cells_filled,
         cells_unfilled=int(cells.sum()) - filled.cells_filled,
         largest_void=int(cells.max(initial=0)),
+        tuning=filled.tuned and filled.tuned.as_dict(),
         warnings=tuple(warnings),
         table=tabulate(filled, source.grid, source.meta),
     )
 
 
-def _write_report(path, result, options, source, band):
+def _write_report(path, result, options, maps, source, band):
     content = {
         **result.as_dict(),
         "input": os.fspath(source),
         "band": band,
         "options": asdict(options),
+        "maps": maps,
         "void_table": list(result.table.rows()),
     }
     with open(path, "w", encoding="utf-8") as file:

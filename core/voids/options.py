@@ -18,6 +18,16 @@ class FillOptions(McmdOptions):
         "mcmd: constrained midpoint displacement (Belhadj 2007), every generation relaxed.",
         choices=("mcmd",),
     )  # fmt: skip
+    natural_roughness: bool = option(
+        bool, False, "Natural roughness",
+        "Make filled ground as rough as the ground around each void: nicer to look at and to run "
+        "models on, but its elevations are less accurate.",
+    )  # fmt: skip
+    tune: bool = option(
+        bool, False, "Tune the parameters",
+        "First fit tension, or l and l_bu, to this raster by artificial voids in its known ground; "
+        "what is found is used if it gains on others of them too. Takes ten seconds and more.",
+    )  # fmt: skip
     interior_only: bool = option(
         bool, False, "Fill interior voids only",
         "Leave voids that touch the raster's edge as they are.",

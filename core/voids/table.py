@@ -4,6 +4,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from demsmith.core.voids.roughness import Roughness
+
 
 @dataclass(frozen=True)
 class VoidTable:
@@ -28,6 +30,9 @@ class VoidTable:
     touches_edge : bool
         Whether the void reaches the raster's edge.
     filled : bool
+    roughness_h, roughness : float64
+        Exponent H of the natural roughness that was added, and its largest displacement at the
+        finest level in the raster's unit; NaN if none was asked for.
     """
 
     id: np.ndarray
@@ -43,6 +48,8 @@ class VoidTable:
     rim_relief: np.ndarray
     touches_edge: np.ndarray
     filled: np.ndarray
+    roughness_h: np.ndarray
+    roughness: np.ndarray
 
     def __len__(self):
         return self.id.size
@@ -82,9 +89,11 @@ def tabulate(filled, grid, meta):
     low, high = ends.min(axis=0), ends.max(axis=0)
     is_filled = np.zeros(count, bool)
     is_filled[filled.selected] = True
+    rough = filled.roughness or Roughness(np.full(count, np.nan), np.full(count, np.nan))
     return VoidTable(
         id=np.arange(1, count + 1), row=row, column=column, x=centre.x, y=centre.y,
         cells=voids.cells, area_m2=np.bincount(void_of_run, run_area, count),
         rim_low=low, rim_mean=meta.real(filled.rims.mean), rim_high=high, rim_relief=high - low,
         touches_edge=filled.rims.touches_edge, filled=is_filled,
+        roughness_h=rough.h, roughness=rough.amplitude * abs(meta.scale),
     )  # fmt: skip

@@ -141,6 +141,32 @@ def test_same_seed_same_bytes(demsmith, dem, output):
     assert made[0] == made[1] != made[2]
 
 
+def test_maps(demsmith, tmp_path, dem, output):
+    """Rough in the west, where the void at the edge is, and smooth inside."""
+    r_s = np.zeros((60, 80), np.float32)
+    r_s[:, :10] = 0.5
+    rough = make_raster(tmp_path / "rough.tif", r_s)
+    words = ("--r-s-map", rough, "--variant", "weighted", "--float")
+    assert demsmith("fill", dem, output, *words).status == 0
+    mapped = raster.read(output).values
+    assert demsmith("fill", dem, output, *words[2:], "--overwrite").status == 0
+    smooth = raster.read(output).values
+    assert (mapped != smooth)[0:2, 0:3].any()
+    assert (mapped == smooth)[10:13, 20:24].all()
+
+
+def test_maps_that_do_not_fit(demsmith, tmp_path, dem, output):
+    small = make_raster(tmp_path / "small.tif", np.zeros((4, 4), np.float32))
+    steep = make_raster(tmp_path / "steep.tif", np.full((60, 80), 3, np.float32))
+    x, *rest = WGS84_3ARC
+    aside = make_raster(tmp_path / "aside.tif", np.zeros((60, 80)), geotransform=(x + 1, *rest))
+    assert_refused(demsmith("fill", dem, output, "--h-map", small), "4 × 4", output)
+    assert_refused(demsmith("fill", dem, output, "--h-map", aside), "lies elsewhere", output)
+    assert_refused(demsmith("fill", dem, output, "--h-map", "no.tif"), "does not exist", output)
+    assert_refused(demsmith("fill", dem, output, "--h-map", steep), "map of h is 3", output)
+    assert_refused(demsmith("fill", dem, output, "--l-map", steep), "no such curve", output)
+
+
 def test_band(demsmith, tmp_path, output):
     bands = np.stack([hills(), hills(seed=2)])
     bands[1, 5:9, 5:9] = -9999

@@ -9,10 +9,12 @@ import pytest
 
 import demsmith as package
 from demsmith.core.cli import main
+from demsmith.core.mcmd import MapFiles
 from demsmith.core.options import specifications
 from demsmith.core.voids import FillOptions, fill_file
 
 SPECS = specifications(FillOptions)
+MAPS = specifications(MapFiles)
 SHARED = (
     "--band", "--nodata", "--below", "--above", "--mask", "--seed", "--threads", "--json",
     "--quiet", "--overwrite", "--creation-option",
@@ -44,7 +46,7 @@ def fill_call(monkeypatch):
         given.update(zip(names, paths, strict=False), **arguments)
         return types.SimpleNamespace(
             voids=1, cells_filled=2, cells_unfilled=0, largest_void=2, seconds=0.1,
-            output=paths[1], warnings=(), as_dict=dict,
+            output=paths[1], tuning=None, warnings=(), as_dict=dict,
         )  # fmt: skip
 
     monkeypatch.setattr(importlib.import_module("demsmith.core.cli.fill"), "fill_file", stand_in)
@@ -87,7 +89,7 @@ def test_help_names_the_voids(demsmith):
     assert "demsmith fill N42E001.hgt filled.tif" in out
 
 
-@pytest.mark.parametrize("spec", SPECS, ids=lambda spec: spec.name)
+@pytest.mark.parametrize("spec", [*SPECS, *MAPS], ids=lambda spec: spec.name)
 def test_help_of_every_option(fill_help, spec):
     entry = fill_help[word_of(spec)]
     assert spec.help in entry
@@ -101,13 +103,13 @@ def test_help_of_every_option(fill_help, spec):
 
 
 def test_help_has_nothing_that_nobody_defined(fill_help):
-    ours = {word_of(spec) for spec in SPECS}
+    ours = {word_of(spec) for spec in [*SPECS, *MAPS]}
     assert set(fill_help) == {*ours, *SHARED, "INPUT", "OUTPUT", "--source-map", "--report"}
 
 
 def test_mcmd_options_have_a_group_of_their_own(demsmith):
     common, mcmd = demsmith("fill", "--help").out.split("─ MCMD ─")
-    for spec in SPECS:
+    for spec in [*SPECS, *MAPS]:
         assert f" {word_of(spec)} " in (mcmd if spec.advanced else common)
 
 
@@ -123,17 +125,25 @@ def test_every_option_reaches_the_fill(fill_call, spec):
             assert getattr(options, other.name) == other.default
 
 
+@pytest.mark.parametrize("spec", MAPS, ids=lambda spec: spec.name)
+def test_every_map_reaches_the_fill(fill_call, spec):
+    name = spec.name.removesuffix("_map")
+    assert fill_call(word_of(spec), "m.tif")["maps"] == {name: "m.tif"}
+
+
 def test_every_parameter_of_the_fill_is_reached(fill_call):
     given = fill_call(
         "--band", 2, "--nodata", -9999, "--below", -500, "--above", 9000, "--mask", "m.tif",
         "--source-map", "s.tif", "--report", "r.json", "--threads", 3, "--overwrite",
         "--creation-option", "COMPRESS=LZW", "--creation-option", "TILED=NO",
+        "--h-map", "h.tif", "--r-s-map", "r.tif",
     )  # fmt: skip
     assert set(given) == set(inspect.signature(fill_file).parameters)
     del given["options"], given["progress"]
     assert given == dict(
-        input="in.tif", output="out.tif", band=2, nodata=(-9999.0,), below=-500.0, above=9000.0,
-        mask="m.tif", source_map="s.tif", report="r.json", threads=3, overwrite=True,
+        input="in.tif", output="out.tif", maps={"h": "h.tif", "r_s": "r.tif"}, band=2,
+        nodata=(-9999.0,), below=-500.0, above=9000.0, mask="m.tif",
+        source_map="s.tif", report="r.json", threads=3, overwrite=True,
         creation_options=("COMPRESS=LZW", "TILED=NO"),
     )  # fmt: skip
 
@@ -141,8 +151,9 @@ def test_every_parameter_of_the_fill_is_reached(fill_call):
 def test_defaults_are_those_of_the_fill(fill_call):
     given = fill_call()
     assert given["options"] == type(given["options"])()
+    assert given["maps"] == {}
     for name, parameter in inspect.signature(fill_file).parameters.items():
-        if name not in ("input", "output", "options", "progress"):
+        if name not in ("input", "output", "options", "maps", "progress"):
             assert given[name] == parameter.default
 
 

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import disc, holed, plane
 
+from demsmith.core.errors import InputError
 from demsmith.core.mcmd import Displacement, Lattice, interpolate
 from demsmith.core.mcmd._displacement import uniform
 from demsmith.core.voids import fill_voids
@@ -90,13 +91,6 @@ def test_amplitude_by_level(h, r_t):
         assert abs(delta - r_t * amplitude).max() <= amplitude * (1 + 1e-9)
 
 
-def test_by_level_is_finest_first():
-    np.testing.assert_allclose(
-        Displacement(8.0, 0.25, 0, 0, 4).by_level(), 8 * 2.0 ** (-0.5 * np.array([4, 3, 2, 1]))
-    )
-    assert Displacement(8.0, 0.5, 0, 0, 0).by_level().size == 0
-
-
 # --- in voids ------------------------------------------------------------------------------------
 
 VARIANTS = ("relaxed", "weighted", "paper")
@@ -156,3 +150,42 @@ def test_noise_of_a_tile_is_the_mosaics():
     part = fill_voids(tile, tile_void, lattice=lattice, **options).values
     far = holed(mosaic.shape, (60, 77, 70, 95), (100, 103, 100, 103))[17:, 23:]
     np.testing.assert_array_equal(part[far], whole[17:, 23:][far])
+
+
+# --- terrain from nothing ------------------------------------------------------------------------
+
+
+def from_nothing(shape=(129, 129), *, h=0.5, seed=1, lattice=None, **options):
+    lattice = lattice or Lattice.covering(shape)
+    displacement = Displacement(100.0, h, 0.0, seed, lattice.levels)
+    return interpolate(
+        np.zeros(shape), np.zeros(shape, bool), displacement=displacement, lattice=lattice,
+        **options,
+    )  # fmt: skip
+
+
+def test_nothing_known_needs_displacements():
+    with pytest.raises(InputError, match="no cell is known"):
+        interpolate(np.zeros((5, 5)), np.zeros((5, 5), bool))
+
+
+def test_terrain_from_nothing_rises_and_falls_about_the_datum():
+    many = np.stack([from_nothing(seed=seed, datum=500.0) for seed in range(60)])
+    assert abs(many.mean() - 500) < 15
+    assert 10 < many.std() < 100
+
+
+@pytest.mark.parametrize("h", [0.3, 0.45])
+def test_terrain_from_nothing_has_the_exponent_of_the_paper(h):
+    """The structure function of displacements with H goes as the distance to the power 4 H."""
+    many = [from_nothing(h=h, seed=seed, scheme="diamond-square") for seed in range(20)]
+    lags = np.array([2, 4, 8, 16])
+    squares = [np.mean([(z[lag:] - z[:-lag]) ** 2 for z in many]) for lag in lags]
+    slope = np.polyfit(np.log(lags), np.log(squares), 1)[0]
+    assert slope == pytest.approx(4 * h, rel=0.25)
+
+
+def test_a_window_of_terrain_from_nothing_is_the_same_terrain():
+    whole = from_nothing((65, 65))
+    window = from_nothing((20, 30), lattice=Lattice(-10, -5, 6))
+    np.testing.assert_array_equal(window, whole[10:30, 5:35])

@@ -10,7 +10,7 @@ from scenes import circle_and_segments, plane
 
 from demsmith.core.errors import InputError
 from demsmith.core.mcmd import Lattice, bottom_up, interpolate
-from demsmith.core.mcmd._passes import curve
+from demsmith.core.mcmd._passes import bend
 
 SCHEMES = ("triangle-edge", "diamond-square")
 VARIANTS = ("paper", "weighted")
@@ -149,14 +149,14 @@ def ascendants(i, j, side, scheme):
 
 @given(st.floats(-9000, 9000), st.floats(0, 1), st.sampled_from([-20, -1, -0.5, 0, 0.5, 1, 2, 20]))
 def test_curve_is_equation_2(e, share, l):
-    assert curve(e, share * 70.0, 70.0, float(l)) == pytest.approx(
+    assert e * bend(share * 70.0, 70.0, float(l)) == pytest.approx(
         phi(e, share * 70.0, 70.0, l), rel=1e-12, abs=1e-9
     )
 
 
 def test_curve_shapes():
     share = np.linspace(0, 1, 21)
-    shape = {l: np.array([curve(1.0, d, 1.0, float(l)) for d in share]) for l in (-2, 0, 0.5, 1, 2)}
+    shape = {l: np.array([bend(d, 1.0, float(l)) for d in share]) for l in (-2, 0, 0.5, 1, 2)}
     np.testing.assert_array_equal(shape[0], 1)  # l = 0: the elevation itself
     np.testing.assert_allclose(shape[1], 1 - share, atol=1e-15)  # a line
     inner = slice(1, -1)
@@ -165,7 +165,7 @@ def test_curve_shapes():
     for l in (0.5, 1, 2):
         assert (np.diff(shape[l]) < 0).all()
     assert (np.diff(shape[-2]) > 0).all()  # below 0: rises with distance
-    assert np.isfinite([curve(1.0, 3.0, 1.0, -2.0), curve(1.0, 3.0, 1.0, 0.5)]).all()
+    assert np.isfinite([bend(3.0, 1.0, -2.0), bend(3.0, 1.0, 0.5)]).all()
 
 
 # --- the top-down pass ---------------------------------------------------------------------------

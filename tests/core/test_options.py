@@ -31,7 +31,7 @@ def test_the_options_there_are():
     """Names are an interface: of the command line, of Processing, of Python."""
     assert set(ALL) == {
         "variant", "scheme", "l", "l_bu", "datum", "tension", "h", "r_s", "r_t", "relief", "seed",
-        "method", "interior_only", "max_size", "float_output",
+        "method", "natural_roughness", "tune", "interior_only", "max_size", "float_output",
     }  # fmt: skip
     assert ALL["float_output"].flag == "float"
     assert ALL["variant"].choices == ("relaxed", "weighted", "paper")

@@ -120,3 +120,39 @@ def test_without_gdal_degrees_still_work_and_reading_says_what_is_missing():
     """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["True", "True"]
+
+
+@pytest.mark.parametrize(
+    ("extent", "resolution", "shape"),
+    [
+        ((500, 100, 590, 130), 10, (3, 9)),
+        ((500, 100, 591, 131), 10, (4, 10)),
+        ((500, 100, 590, 130), (30, 5), (6, 3)),
+        ((500, 100, 501, 101), 10, (1, 1)),
+        ((10, 49, 11, 50), 1 / 1200, (1200, 1200)),  # no 1201st cell by rounding
+    ],
+)
+def test_grid_of_an_extent_covers_it_from_its_north_western_corner(extent, resolution, shape):
+    grid = Grid.of_extent(extent, resolution, "EPSG:32631")
+    xmin, _, _, ymax = extent
+    width, height = np.broadcast_to(resolution, 2)
+    assert grid.shape == shape
+    assert grid.geotransform == (xmin, width, 0, ymax, 0, -height)
+    assert grid.crs == "EPSG:32631"
+
+
+@pytest.mark.parametrize(
+    ("extent", "resolution", "complaint"),
+    [
+        ((0, 0, 0, 10), 1, "empty"),
+        ((0, 10, 10, 0), 1, "give xmin, ymin, xmax, ymax"),
+        ((0, 0, np.inf, 10), 1, "not finite"),
+        ((0, np.nan, 10, 10), 1, "not finite"),
+        ((0, 0, 10, 10), 0, "must be positive"),
+        ((0, 0, 10, 10), (1, -1), "must be positive"),
+        ((0, 0, 10, 10), np.nan, "must be positive"),
+    ],
+)
+def test_grid_of_an_unusable_extent(extent, resolution, complaint):
+    with pytest.raises(InputError, match=complaint):
+        Grid.of_extent(extent, resolution)

@@ -285,7 +285,7 @@ def test_report_is_json_with_all_that_matters(tmp_path):
     assert [row["cells"] for row in report["void_table"]] == [18, 253, 2]
     assert set(report["void_table"][0]) == {
         "id", "row", "column", "x", "y", "cells", "area_m2", "rim_low", "rim_mean", "rim_high",
-        "rim_relief", "touches_edge", "filled",
+        "rim_relief", "touches_edge", "filled", "roughness_h", "roughness",
     }  # fmt: skip
     json.dumps(result.as_dict(), allow_nan=False)
 

@@ -1,7 +1,8 @@
 """Names, types and defaults of the tool: what models and scripts of users rely on."""
 
 import pytest
-from qgis.core import QgsApplication, QgsProcessingParameterDefinition
+from qgis_runs import parameter_row
+from qgis_runs import tool as make
 
 PARAMETERS = """
 INPUT            raster             -              required
@@ -11,6 +12,8 @@ MASK             raster             -              optional
 BELOW            number             -              optional advanced
 ABOVE            number             -              optional advanced
 METHOD           enum               mcmd           required
+NATURAL_ROUGHNESS boolean           False          required
+TUNE             boolean            False          required
 INTERIOR_ONLY    boolean            False          required
 MAX_SIZE         number             -              optional
 FLOAT            boolean            False          required
@@ -25,6 +28,11 @@ R_S              number             0.0            required advanced
 R_T              number             0.0            required advanced
 RELIEF           number             -              optional advanced
 SEED             number             0              required advanced
+L_MAP            raster             -              optional advanced
+L_BU_MAP         raster             -              optional advanced
+H_MAP            raster             -              optional advanced
+R_S_MAP          raster             -              optional advanced
+R_T_MAP          raster             -              optional advanced
 THREADS          number             -              optional advanced
 CREATION_OPTIONS string             -              optional advanced
 OUTPUT           rasterDestination  -              required
@@ -47,24 +55,12 @@ OUTPUTS = {
 
 @pytest.fixture
 def tool(plugin):
-    return QgsApplication.processingRegistry().createAlgorithmById("demsmith:fillvoids")
-
-
-def _row(parameter):
-    flags = QgsProcessingParameterDefinition.Flag
-    default = parameter.defaultValue()
-    row = [
-        parameter.name(),
-        parameter.type(),
-        "-" if default in (None, "") else str(default),
-        "optional" if parameter.flags() & flags.FlagOptional else "required",
-    ]
-    return row + ["advanced"] * bool(parameter.flags() & flags.FlagAdvanced)
+    return make("fillvoids")
 
 
 def test_parameters_are_the_promised_ones(tool):
     promised = [line.split() for line in PARAMETERS.strip().splitlines()]
-    assert [_row(parameter) for parameter in tool.parameterDefinitions()] == promised
+    assert [parameter_row(parameter) for parameter in tool.parameterDefinitions()] == promised
 
 
 def test_outputs_are_the_promised_ones(tool):

@@ -1,33 +1,11 @@
 """The plugin in the real `qgis_process`, as a user installs it."""
 
 import json
-import subprocess
 
 import numpy as np
-import pytest
-import qgis_process as finder  # the demo's
 from gdal_reading import read
 
 VOID = -32768
-
-
-@pytest.fixture(scope="module")
-def qgis_process(tmp_path_factory):
-    """Give a function that calls `qgis_process` with the checkout enabled as a plugin."""
-    program = finder.find()
-    if program is None:
-        pytest.skip("qgis_process is not installed")
-    environment = finder.environment(tmp_path_factory.mktemp("qgis"))
-
-    def call(*arguments):
-        return subprocess.run(
-            [program, *arguments], env=environment, capture_output=True, text=True,
-            timeout=240, check=False,
-        )  # fmt: skip
-
-    enabled = call("plugins", "enable", "demsmith")
-    assert enabled.returncode == 0, enabled.stderr
-    return call
 
 
 def test_the_tool_is_listed_with_its_words(qgis_process):

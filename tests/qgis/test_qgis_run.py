@@ -81,6 +81,23 @@ def test_advanced_options_reach_the_core(fill, holed, tmp_path, option):
 
 
 @pytest.mark.parametrize(
+    ("name", "value"),
+    [("L_MAP", 1), ("L_BU_MAP", 5), ("H_MAP", 0.1), ("R_S_MAP", 0.5), ("R_T_MAP", 0.7)],
+)
+def test_maps_reach_the_core(fill, holed, tmp_path, name, value):
+    """Each changes the void inside, on whose side alone it has numbers; a layer or a file."""
+    values = np.full((60, 80), np.nan, np.float32)
+    values[:, 25:] = value
+    path = make_raster(tmp_path / "map.tif", values)
+    options = {"R_S": 0.2, "VARIANT": "weighted", "FLOAT": True}
+    plain = read(fill(holed[0], **options)["OUTPUT"])[0]
+    for given in (path, QgsRasterLayer(path, "map")):
+        other = read(fill(holed[0], **options, **{name: given})["OUTPUT"])[0]
+        assert (other != plain)[20:26, 30:38].any()
+        assert (other == plain)[50:55, 0:2].all() or name == "L_BU_MAP"
+
+
+@pytest.mark.parametrize(
     ("option", "left"), [({"INTERIOR_ONLY": True}, 10), ({"MAX_SIZE": 20}, 48), ({}, 0)]
 )
 def test_restrictions(fill, holed, tmp_path, option, left):
@@ -239,6 +256,8 @@ def _truncated(tmp_path):
 
 
 def _plain(tmp_path):
+    make_raster(tmp_path / "small.tif", np.zeros((4, 4), np.uint8))
+    make_raster(tmp_path / "nines.tif", np.full((60, 80), 9, np.uint8))
     return make_raster(tmp_path / "plain.tif", hills())
 
 
@@ -251,6 +270,11 @@ def _plain(tmp_path):
         (_plain, {"BAND": 3}, "band 3 asked"),
         (_plain, {"NODATA": "low"}, "NODATA is 'low'; give numbers"),
         (_plain, {"MAX_SIZE": 0}, "MAX_SIZE"),
+        (_plain, {"H_MAP": "{folder}/small.tif"}, "small.tif', has 4 × 4 cells"),
+        (_plain, {"H_MAP": "{folder}/nines.tif"}, "map of h is 9 at row 0, column 0"),
+        (_plain, {"L_MAP": "{folder}/nines.tif"}, "no such curve"),
+        (_plain, {"R_T_MAP": "{folder}/none.tif"}, "R_T_MAP"),
+        (_plain, {"R_S_MAP": "{folder}/nines.tif", "OUTPUT": "{folder}/nines.tif"}, "is an input"),
         (_plain, {"METHOD": "magic"}, "METHOD"),
         (_plain, {"OUTPUT": "{folder}/filled.asc"}, ".asc” files are not supported"),
         (_plain, {"OUTPUT": "{folder}/none/filled.tif"}, "there is no folder"),
@@ -278,11 +302,13 @@ def test_errors_say_what_is_wrong_and_leave_nothing(fill, tmp_path, make, parame
     assert unchanged is None or digest(source) == unchanged
 
 
-def test_a_layer_that_is_no_file_is_refused(fill):
+def test_a_layer_that_is_no_file_is_refused(fill, holed):
     layer = QgsRasterLayer("type=xyz&url=file:///none/{z}/{x}/{y}.png&zmax=1", "tiles", "wms")
     assert layer.isValid()
     with pytest.raises(QgsProcessingException, match="'tiles' comes from 'wms', not from a file"):
         fill(layer)
+    with pytest.raises(QgsProcessingException, match="R_S_MAP: layer 'tiles' comes from 'wms'"):
+        fill(holed[0], R_S_MAP=layer)
 
 
 def test_a_layer_with_open_options_is_refused(fill, holed):

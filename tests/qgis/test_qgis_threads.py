@@ -3,18 +3,11 @@
 import os
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
-from qgis.core import (
-    QgsApplication,
-    QgsProcessingAlgRunnerTask,
-    QgsProcessingContext,
-    QgsProcessingException,
-    QgsProcessingFeedback,
-)
-from qgis.PyQt.QtCore import QEventLoop, QTimer
+from qgis.core import QgsProcessingException, QgsProcessingFeedback
+from qgis_runs import TaskRun
 from support import hills, make_raster
 
 VOID = -32768
@@ -59,52 +52,14 @@ def large(tmp_path_factory):
     return make_raster(tmp_path_factory.mktemp("large") / "large.tif", values, nodata=VOID)
 
 
-class _Run:
-    """One run of the tool as a task, with the main thread's event loop ticking meanwhile."""
-
-    def __init__(self, parameters, *, cancel_at=None):
-        self.feedback = QgsProcessingFeedback()
-        self.context = QgsProcessingContext()
-        self.progress, self.gaps, self.cancelled_at = [], [], None
-        tool = QgsApplication.processingRegistry().createAlgorithmById("demsmith:fillvoids")
-        task = QgsProcessingAlgRunnerTask(tool, parameters, self.context, self.feedback)
-        self._loop = QEventLoop()
-        self._cancel_at = cancel_at
-        self.feedback.progressChanged.connect(self._on_progress)
-        task.executed.connect(self._on_end)
-        timer = QTimer()
-        timer.timeout.connect(self._tick)
-        self._last = time.perf_counter()
-        timer.start(10)
-        QgsApplication.taskManager().addTask(task)
-        self._loop.exec()
-        timer.stop()
-
-    def _tick(self):
-        now = time.perf_counter()
-        self.gaps.append(now - self._last)
-        self._last = now
-
-    def _on_progress(self, percent):
-        self.progress.append(percent)
-        if self._cancel_at is not None and percent >= self._cancel_at and not self.cancelled_at:
-            self.cancelled_at = time.perf_counter()
-            self.feedback.cancel()
-
-    def _on_end(self, fine, outputs):
-        self.ended_at = time.perf_counter()
-        self.fine, self.outputs = fine, outputs
-        self._loop.quit()
-
-
 def _fill_once(holed, tmp_path):
     """Compile or load the kernels, which no run can be interrupted in."""
-    assert _Run({"INPUT": holed[0], "OUTPUT": str(tmp_path / "first.tif")}).fine
+    assert TaskRun("fillvoids", {"INPUT": holed[0], "OUTPUT": str(tmp_path / "first.tif")}).fine
 
 
 def test_the_window_stays_responsive(plugin, holed, large, tmp_path):
     _fill_once(holed, tmp_path)
-    run = _Run({"INPUT": large, "OUTPUT": str(tmp_path / "filled.tif")})
+    run = TaskRun("fillvoids", {"INPUT": large, "OUTPUT": str(tmp_path / "filled.tif")})
     assert run.fine
     assert run.outputs["CELLS_FILLED"] == 25 * 150**2
     assert max(run.gaps) < 0.5
@@ -120,7 +75,8 @@ def test_cancel_is_prompt_and_leaves_nothing(plugin, holed, large, tmp_path, per
     folder.mkdir()
     old = folder / "filled.tif"
     old.write_bytes(b"the user's older result")
-    run = _Run(
+    run = TaskRun(
+        "fillvoids",
         {
             "INPUT": large,
             "OUTPUT": str(old),
@@ -146,7 +102,7 @@ def test_a_cancelled_script_gets_an_exception_not_a_result(fill, large):
 
 def test_failure_on_the_worker_is_a_failed_task(plugin, tmp_path):
     source = make_raster(tmp_path / "n.tif", np.full((9, 9), VOID, np.int16), nodata=VOID)
-    run = _Run({"INPUT": source, "OUTPUT": str(tmp_path / "filled.tif")})
+    run = TaskRun("fillvoids", {"INPUT": source, "OUTPUT": str(tmp_path / "filled.tif")})
     assert not run.fine
     assert "every cell is a void" in run.feedback.textLog()
     assert not (tmp_path / "filled.tif").exists()

@@ -1,0 +1,75 @@
+"""What tools share that work on one band of a raster: which raster, band and cells are read."""
+
+from qgis.core import (
+    QgsProcessingException,
+    QgsProcessingParameterBand,
+    QgsProcessingParameterRasterLayer,
+    QgsProcessingParameterString,
+)
+
+from demsmith.algorithms.base import Tool
+from demsmith.algorithms.parameters import add, number, read_number, tr
+
+
+class BandTool(Tool):
+    """A tool that reads one band of a raster; its `initAlgorithm` begins with `add_source`."""
+
+    def add_source(self, help_text):
+        """Declare the raster, whose ``help_text`` is given, its band and its voids."""
+        add(self, QgsProcessingParameterRasterLayer("INPUT", tr("Elevation model")),
+            help_text=help_text)  # fmt: skip
+        add(self, QgsProcessingParameterBand("BAND", tr("Band"), 1, "INPUT", optional=True),
+            help_text="The band that holds the elevations.")  # fmt: skip
+        add(self, QgsProcessingParameterString(
+                "NODATA", tr("More values that mean void"), optional=True),
+            help_text="Numbers, separated by commas: cells with these values are voids, besides "
+            "the band's nodata value.")  # fmt: skip
+        add(self, QgsProcessingParameterRasterLayer(
+                "MASK", tr("Mask of voids"), optional=True),
+            help_text="Raster of the same size: cells that are neither 0 nor nodata are voids.",
+            )  # fmt: skip
+        add(self, number("BELOW", "Void at or below", optional=True), advanced=True,
+            help_text="Cells with this value or a lower one are voids.")  # fmt: skip
+        add(self, number("ABOVE", "Void at or above", optional=True), advanced=True,
+            help_text="Cells with this value or a higher one are voids.")  # fmt: skip
+
+    def checkParameterValues(self, parameters, context):
+        """Check what can be checked before the run."""
+        fine, message = super().checkParameterValues(parameters, context)
+        if not fine:
+            return False, message
+        try:
+            self.raster_source(parameters, "INPUT", context)
+            self.raster_source(parameters, "MASK", context)
+            self._void_values(parameters, context)
+        except QgsProcessingException as error:
+            return False, str(error)
+        return True, ""
+
+    def prepareAlgorithm(self, parameters, context, feedback):
+        """Look layers up here, in the main thread, where QGIS keeps them."""
+        self._input = self.raster_source(parameters, "INPUT", context)
+        self._mask = self.raster_source(parameters, "MASK", context)
+        return True
+
+    def read_source(self, parameters, context):
+        """Give the arguments of the core's file functions that say what is read."""
+        return dict(
+            input=self._input,
+            band=self.parameterAsInt(parameters, "BAND", context),
+            nodata=self._void_values(parameters, context),
+            below=read_number(self, "BELOW", parameters, context),
+            above=read_number(self, "ABOVE", parameters, context),
+            mask=self._mask,
+        )
+
+    def _void_values(self, parameters, context):
+        text = self.parameterAsString(parameters, "NODATA", context)
+        try:
+            return tuple(float(each) for each in text.split(",") if each.strip())
+        except ValueError:
+            raise QgsProcessingException(
+                tr("NODATA is '{}'; give numbers separated by commas, such as -9999, 0").format(
+                    text
+                )
+            ) from None
