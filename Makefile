@@ -47,8 +47,10 @@ lint: $(VENV)/test.stamp ## style and the direction of imports
 	@$(PY) -m flake8
 	@$(VENV)/bin/lint-imports --no-logo --no-cache
 
-bench: $(VENV)/test.stamp ## measure filling against GDAL in the same run
+bench: $(VENV)/test.stamp ## measure against GDAL and SciPy in the same run: filling, samples, tuning
 	@$(PY) benchmarks/fill.py
+	@$(PY) benchmarks/mcmd.py
+	@$(PY) benchmarks/tuning.py
 
 zip: ## the plugin as QGIS installs it, from the last commit (REVISION=… for another)
 	@mkdir -p "$(DIST)"

@@ -1,7 +1,6 @@
 """The tool *Fill voids*."""
 
 from qgis.core import (
-    QgsProcessingException,
     QgsProcessingOutputNumber,
     QgsProcessingOutputString,
     QgsProcessingParameterFileDestination,
@@ -107,21 +106,10 @@ class FillVoids(BandTool):
             self.addOutput(QgsProcessingOutputNumber(name, tr(title)))
         self.addOutput(QgsProcessingOutputString("WARNINGS", tr("Warnings")))
 
-    def checkParameterValues(self, parameters, context):
-        """Check what can be checked before the run."""
-        fine, message = super().checkParameterValues(parameters, context)
-        if not fine:
-            return False, message
-        try:
-            read_maps(self, parameters, context)
-        except QgsProcessingException as error:
-            return False, str(error)
-        return True, ""
-
-    def prepareAlgorithm(self, parameters, context, feedback):
-        """Look layers up here, in the main thread, where QGIS keeps them."""
+    def look_up(self, parameters, context):
+        """Find the layers that were given, and keep for the run what names them."""
+        super().look_up(parameters, context)
         self._maps = read_maps(self, parameters, context)
-        return super().prepareAlgorithm(parameters, context, feedback)
 
     def compute(self, parameters, context, feedback, progress):
         """Fill the voids."""

@@ -18,7 +18,7 @@ from qgis.core import (
 )
 
 from demsmith.algorithms import styling
-from demsmith.algorithms.base import Tool, help_picture
+from demsmith.algorithms.base import help_picture
 from demsmith.algorithms.parameters import (
     add,
     add_maps,
@@ -30,6 +30,7 @@ from demsmith.algorithms.parameters import (
     tr,
 )
 from demsmith.algorithms.samplelayers import SampleLayers
+from demsmith.algorithms.source import VoidTool
 
 _HELP = """
 {picture}
@@ -68,7 +69,7 @@ _READING = 0.2  # of the progress
 _DECIMALS = 12  # of a resolution in degrees
 
 
-class ReconstructFromSamples(Tool):
+class ReconstructFromSamples(VoidTool):
     """Make terrain from samples: `demsmith.core.samples.samples_file` in Processing."""
 
     def name(self):
@@ -139,6 +140,7 @@ class ReconstructFromSamples(Tool):
             advanced=True)  # fmt: skip
         add(self, number("BAND", "Band of rasters", kind=int, default=1, minValue=1),
             help_text="The band that holds the elevations.", advanced=True)  # fmt: skip
+        self.add_voids(advanced=True)
 
     def _declare_grid(self):
         add(self, QgsProcessingParameterRasterLayer(
@@ -187,24 +189,6 @@ class ReconstructFromSamples(Tool):
             self.addOutput(QgsProcessingOutputNumber(name, tr(title)))
         self.addOutput(QgsProcessingOutputString("WARNINGS", tr("Warnings")))
 
-    def checkParameterValues(self, parameters, context):
-        """Check what can be checked before the run."""
-        from demsmith.core.errors import InputError
-
-        fine, message = super().checkParameterValues(parameters, context)
-        if not fine:
-            return False, message
-        try:
-            self._look_up(parameters, context)
-        except (QgsProcessingException, InputError) as error:
-            return False, str(error)
-        return True, ""
-
-    def prepareAlgorithm(self, parameters, context, feedback):
-        """Look layers up here, in the main thread, where QGIS keeps them."""
-        self._look_up(parameters, context)
-        return True
-
     def compute(self, parameters, context, feedback, progress):
         """Make the terrain."""
         from demsmith.core.progress import Span
@@ -226,6 +210,7 @@ class ReconstructFromSamples(Tool):
             **self._sketch(parameters, context),
             field=self._field(parameters, context),
             band=self.parameterAsInt(parameters, "BAND", context),
+            **self.read_voids(parameters, context),
             **self.read_running(parameters, context),
             progress=Span(progress, _READING, 1),
         )
@@ -247,8 +232,9 @@ class ReconstructFromSamples(Tool):
             styling.style_sample_map(source_map, context)
         return outputs
 
-    def _look_up(self, parameters, context):
+    def look_up(self, parameters, context):
         """Find the layers, and the grid as far as they tell it; all is kept for the run."""
+        super().look_up(parameters, context)
         self._like = self.raster_source(parameters, "LIKE", context)
         self._maps = read_maps(self, parameters, context)
         self._layers = SampleLayers(

@@ -14,8 +14,8 @@ from demsmith.algorithms.source import BandTool
 
 _HELP = """
 <p>Keeps a share of the cells of an elevation model, those that carry its shape, and makes all
-others nodata. Kept cells have their exact values. <i>Fill voids</i> rebuilds a terrain from
-them.</p>
+others nodata. Kept cells have their exact values. <i>Reconstruct from samples</i> rebuilds a
+terrain from them.</p>
 <p><b>Ridges and valleys</b> (<i>ridges</i>): kept cells crowd where the ground bends, along crests,
 valleys and edges, and thin out evenly on slopes and plains. The terrain is rebuilt from them with
 a quarter to a half less error than from random cells.</p>

@@ -5,10 +5,8 @@ section into ``benchmarks/RESULTS.md``.
 """
 
 import argparse
-import datetime
 import hashlib
 import os
-import platform
 import re
 import statistics
 import subprocess
@@ -19,15 +17,15 @@ from pathlib import Path
 
 import numpy as np
 import tiles
-from osgeo import gdal, osr
+from osgeo import osr
+from results import provenance, write_section
 
 import demsmith
 from demsmith.core import raster
 from demsmith.core.raster.peer import gdal_fill
 from demsmith.core.voids.validation import errors_by_size, punch_voids
 
-gdal.UseExceptions()
-HERE = Path(__file__).resolve().parent
+osr.UseExceptions()
 SEEDS = (0, 1, 2)
 ROUNDS = 9
 CLASSES = ("1–16", "17–100", "101–1k", "> 1k", "all")
@@ -58,12 +56,9 @@ def main():
 
 def heading():
     """Say when and where this was measured."""
-    cpu = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
     return (
         "## Void filling: the fast engine (`fill --method mcmd`)\n\n"
-        f"{datetime.date.today()}, {os.cpu_count()} cores of {cpu.group(1) if cpu else '?'}, "
-        f"Python {platform.python_version()}, NumPy {np.__version__}, "
-        f"GDAL {gdal.__version__}. Repeat with `.venv/bin/python benchmarks/fill.py`. "
+        f"{provenance('numpy', 'gdal')} Repeat with `.venv/bin/python benchmarks/fill.py`. "
         "Masks as punched by `demsmith.core.voids.validation.punch_voids`: about 5 % of the cells "
         "in voids of all sizes."
     )
@@ -275,16 +270,6 @@ def same_bytes():
         f"(SHA-256 {sorted(digests)[0][:16]}…). NumPy 1.26 and the newest 2.x: compared in "
         "`tests/test_house_numpy2.py`."
     )
-
-
-def write_section(text):
-    """Replace this benchmark's section of RESULTS.md, or add it."""
-    path = HERE / "RESULTS.md"
-    old = path.read_text() if path.exists() else "# Results\n"
-    title = re.escape(text.splitlines()[0])
-    pattern = re.compile(rf"^{title}\n.*?(?=^## |\Z)", re.S | re.M)
-    new = pattern.sub(lambda _: text + "\n", old) if pattern.search(old) else f"{old}\n{text}"
-    path.write_text(new.rstrip() + "\n")
 
 
 if __name__ == "__main__":

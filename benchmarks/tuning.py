@@ -12,7 +12,7 @@ import time
 import nlopt
 import numpy as np
 import tiles
-from fill import write_section
+from results import write_section
 
 from demsmith.core import raster
 from demsmith.core.samples.options import SampleOptions

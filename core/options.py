@@ -67,6 +67,36 @@ def specifications(options_class):
     ]
 
 
+def options_from(options_class, options, parameters, function):
+    """Give the checked options of a function that takes them whole or as keywords of their own.
+
+    Parameters
+    ----------
+    options_class : type
+    options : object or None
+        As given whole.
+    parameters : dict
+        As given by keywords.
+    function : str
+        Its name, for messages.
+
+    Raises
+    ------
+    InputError
+        If both were given, a keyword is no option's, or a value is out of range.
+    """
+    if options is None:
+        try:
+            options = options_class(**parameters)
+        except TypeError as error:
+            told = str(error).replace(f"{options_class.__name__}.__init__()", function)
+            raise InputError(told) from None
+    elif parameters:
+        raise InputError(f"give options or {', '.join(parameters)}, not both")
+    validate(options)
+    return options
+
+
 def validate(options):
     """Raise `InputError` for the first value that is of the wrong kind or out of range."""
     for spec in specifications(type(options)):

@@ -60,3 +60,20 @@ def checkpoint(progress, fraction):
     if progress.cancelled():
         raise Cancelled()
     progress.report(fraction)
+
+
+class Muted:
+    """The wish to cancel of another progress, without its reports.
+
+    For work side by side, of which only the whole is reported.
+    """
+
+    def __init__(self, progress):
+        self._progress = progress
+
+    def report(self, fraction):
+        """Report nothing."""
+
+    def cancelled(self):
+        """Tell whether the other progress asks to stop."""
+        return self._progress.cancelled()

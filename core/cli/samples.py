@@ -122,10 +122,11 @@ def samples(
 
 def _summary(result):
     """Tell in a line what was done."""
-    done = (
-        f"made {result.rows} × {result.columns} cells, {result.cells_known} of them from "
-        f"{result.samples} samples,"
-    )
+    whence = f"from {result.samples} samples" if result.samples else "from the sketch"
+    done = f"made {result.rows} × {result.columns} cells"
+    if result.cells_known:
+        done += f", {result.cells_known} of them {whence}"
+    done += ","
     if result.tuning and result.tuning["accepted"]:
         done += f" {result.tuning['summary']},"
     return f"{done} in {result.seconds:.1f} s -> {result.output}"

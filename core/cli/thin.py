@@ -13,8 +13,8 @@ _Options = parameters(ThinOptions, group=VERB, advanced=VERB)
 app = App(
     name="thin",
     help_epilogue="""\
-Kept cells have their exact values, all others become nodata. To rebuild the terrain, fill them:
-demsmith fill THINNED REBUILT.
+Kept cells have their exact values, all others become nodata. To rebuild the terrain:
+demsmith samples THINNED REBUILT.
 
 Examples:
   demsmith thin N37W004.hgt thinned.tif --share 0.05

@@ -10,6 +10,7 @@ from demsmith.core.mcmd.maps import MAP_NAMES, Maps
 from demsmith.core.mcmd.options import McmdOptions
 from demsmith.core.options import option, specifications
 from demsmith.core.progress import SILENT, Span
+from demsmith.core.raster.grid import check_same_grid
 
 _TOLERANCE = 0.1  # pixels by which a map may lie beside the elevations
 
@@ -81,25 +82,10 @@ def read_maps(paths, grid, *, progress=SILENT):
 
 def _read_map(name, path, grid, progress):
     source = raster.read(path, progress=progress)
-    _check_grid(f"the map of {name}, '{path}',", source.grid, grid)
+    check_same_grid(
+        source.grid, grid, what=f"the map of {name}, '{path}',", whose="the elevations",
+        tolerance=_TOLERANCE,
+    )  # fmt: skip
     values = source.meta.real(source.values.astype(np.float64))
     values[source.void] = np.nan
     return values
-
-
-def _check_grid(what, here, grid):
-    if here.shape != grid.shape:
-        raise InputError(
-            f"{what} has {here.shape.rows} × {here.shape.columns} cells, "
-            f"the elevations {grid.shape.rows} × {grid.shape.columns}"
-        )
-    if not (here.georeferenced and grid.georeferenced):
-        return
-    _, width, _, _, _, height = grid.geotransform
-    for row, column in ((0, 0), (grid.shape.rows - 1, grid.shape.columns - 1)):
-        x, y = (a - b for a, b in zip(here.xy(row, column), grid.xy(row, column), strict=True))
-        if abs(x) > _TOLERANCE * abs(width) or abs(y) > _TOLERANCE * abs(height):
-            raise InputError(
-                f"{what} lies elsewhere than the elevations; bring it to their grid, "
-                "for example with gdalwarp"
-            )

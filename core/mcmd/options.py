@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from demsmith.core.options import option
 
 VARIANTS = ("relaxed", "weighted", "paper")
-SCHEMES = ("triangle-edge", "diamond-square")
+SCHEMES = ("auto", "triangle-edge", "diamond-square")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,8 +20,10 @@ class McmdOptions:
         choices=VARIANTS, advanced=True,
     )  # fmt: skip
     scheme: str = option(
-        str, "triangle-edge", "Subdivision scheme",
-        "Which neighbours a midpoint descends from. Variants weighted and paper only.",
+        str, "auto", "Subdivision scheme",
+        "Which neighbours a midpoint descends from. auto: triangle-edge, or diamond-square where "
+        "nothing is known, for noise alone shows triangle-edge's squares. Variants weighted and "
+        "paper only.",
         choices=SCHEMES, advanced=True,
     )  # fmt: skip
     l: float = option(  # noqa: E741, the paper's name
@@ -39,13 +41,13 @@ class McmdOptions:
     datum: float = option(
         float, None, "Datum [m]",
         "Elevation from which l and l_bu bend the surface; not above the lowest known cell. "
-        "Not given: the lowest known cell.",
+        "Not given: the lowest known cell. Where nothing is known: about which terrain is made.",
         advanced=True,
     )  # fmt: skip
     tension: float = option(
         float, None, "Tension length [m]",
         "Distance over which bending gives way to stretching: less is tauter, with less overshoot "
-        "in large voids. Not given: 12 cells. Variant relaxed only.",
+        "in large voids. Not given: 12 cells. Variants relaxed and converged only.",
         minimum=1e-6, advanced=True,
     )  # fmt: skip
     h: float = option(

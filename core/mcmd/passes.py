@@ -78,9 +78,9 @@ def interpolate(
         of the cell that receives an elevation.
     displacement : Displacement, optional
         Noise of the top-down pass; default: none.
-    scheme : {"triangle-edge", "diamond-square"}
+    scheme : {"auto", "triangle-edge", "diamond-square"}
         Which cells are a cell's ascendants. The centre of a triangle-edge square lies on its main
-        diagonal.
+        diagonal. ``auto`` is triangle-edge where anything is known, else diamond-square.
     datum : float, optional
         Elevation [m] above which the curves act; default: the lowest known cell.
     d_max : float, optional
@@ -119,12 +119,12 @@ class _Passes:
     """A lattice around a raster, and the passes over it."""
 
     def __init__(
-        self, values, known, *, scheme="triangle-edge", datum=None, d_max=None, pixel_size=None,
+        self, values, known, *, scheme="auto", datum=None, d_max=None, pixel_size=None,
         lattice=None, threads=None,
     ):  # fmt: skip
         self.shape = values.shape
         self.threads = threads
-        self.triangle = scheme == "triangle-edge"
+        self.triangle = scheme == "triangle-edge" or (scheme == "auto" and bool(known.any()))
         self.lattice = lattice or Lattice.covering(values.shape)
         self.origin = self.lattice.row, self.lattice.column
         row, column = -self.lattice.row, -self.lattice.column

@@ -10,7 +10,7 @@ from demsmith.core.raster.grid import XY, Grid, PixelSize, Shape
 from demsmith.core.raster.outputs import check_output, check_place, whole_or_nothing
 from demsmith.core.raster.points import write_points
 from demsmith.core.raster.raster import BandMeta, Raster
-from demsmith.core.raster.reading import read
+from demsmith.core.raster.reading import read, read_grid
 from demsmith.core.raster.samples_file import read_samples_file
 from demsmith.core.raster.table import read_table
 from demsmith.core.raster.vector import read_features
@@ -32,6 +32,7 @@ __all__ = [
     "check_place",
     "read",
     "read_features",
+    "read_grid",
     "read_raster",
     "read_samples_file",
     "read_table",

@@ -39,6 +39,11 @@ class CrsUnits:
     vertical_unit: float | None = None
     mercator: bool = False
 
+    @property
+    def on_earth(self):
+        """Whether the ellipsoid is one of the Earth."""
+        return 6.3e6 < self.ellipsoid.radius < 6.4e6
+
 
 @functools.lru_cache(maxsize=64)
 def crs_units(crs):

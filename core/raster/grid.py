@@ -195,6 +195,40 @@ class Grid:
         return abs(self.geotransform[1]) * units.unit, abs(self.geotransform[5]) * units.unit
 
 
+def check_same_grid(grid, wanted, *, what, whose, tolerance):
+    """Refuse a grid that is not another one; without georeference, its shape must do.
+
+    Parameters
+    ----------
+    grid, wanted : Grid
+    what, whose : str
+        Whose these are, for messages.
+    tolerance : float
+        Pixels by which corners may lie apart.
+
+    Raises
+    ------
+    InputError
+        If they differ in shape or place.
+    """
+    if grid.shape != wanted.shape:
+        raise InputError(
+            f"{what} has {grid.shape.rows} × {grid.shape.columns} cells, "
+            f"{whose} {wanted.shape.rows} × {wanted.shape.columns}"
+        )
+    if not (grid.georeferenced and wanted.georeferenced):
+        return
+    _, width, _, _, _, height = wanted.geotransform
+    for row, column in ((0, 0), (wanted.shape.rows - 1, wanted.shape.columns - 1)):
+        here, there = grid.xy(row, column), wanted.xy(row, column)
+        apart = abs((here.x - there.x) / width), abs((here.y - there.y) / height)
+        if max(apart) > tolerance:
+            raise InputError(
+                f"{what} lies elsewhere than {whose}; bring it to that grid, "
+                "for example with gdalwarp"
+            )
+
+
 def _cells_covering(length, side):
     """Count cells; what is beyond a whole number by rounding only makes none of its own."""
     return max(1, math.ceil(length / side - 1e-6))

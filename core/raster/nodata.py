@@ -73,7 +73,7 @@ class VoidFinder:
     ----------
     meta : BandMeta
         The band's data type, nodata tag, scale, offset and unit.
-    nodata : iterable of float
+    nodata : float or iterable of float
         Further stored values that mean void.
     below, above : float or None
         Real values (scaled and offset) at or below, at or above which cells are void.
@@ -81,15 +81,21 @@ class VoidFinder:
         Metres in the unit of the heights; 1 is assumed if unknown.
     earth : bool
         Whether the heights are the Earth's, so that impossible ones can be told.
+    noun : str
+        What holds the values, for the notes.
     """
 
-    def __init__(self, meta, *, nodata=(), below=None, above=None, metres=None, earth=True):
+    def __init__(
+        self, meta, *, nodata=(), below=None, above=None, metres=None, earth=True, noun="cell"
+    ):
         self._meta = meta
         self._below, self._above = below, above
+        self._noun = noun
         self._unit_known = metres is not None
         self._lowest = LOWEST_LAND / (metres or 1.0) if earth else -np.inf
         self._highest = HIGHEST_LAND / (metres or 1.0) if earth else np.inf
         tag = () if meta.nodata is None else (meta.nodata,)
+        nodata = nodata if np.iterable(nodata) else (nodata,)
         self._marks = [
             mark
             for mark in (as_stored(value, meta.dtype) for value in (*tag, *nodata))
@@ -154,14 +160,17 @@ class VoidFinder:
         for mark, count in self._sentinel_counts.items():
             if count:
                 notes.append(
-                    f"{_cells(count)} {mark}, a common void mark, though the band {tagged}; "
+                    f"{self._holders(count)} {mark}, a common void mark, though the band {tagged}; "
                     "counted as voids"
                 )
         if self._huge:
-            notes.append(f"{_cells(self._huge)} values beyond 1e30; counted as voids")
+            notes.append(f"{self._holders(self._huge)} values beyond 1e30; counted as voids")
         if self._odd:
             notes.append(self._odd_note())
         return notes
+
+    def _holders(self, count):
+        return f"1 {self._noun} holds" if count == 1 else f"{count} {self._noun}s hold"
 
     def _odd_note(self):
         low, high = self._odd_range
@@ -180,10 +189,7 @@ class VoidFinder:
             remedy = " ".join(remedies)
         feet = "" if self._unit_known or high > 30000 or low < -1640 else " (unless they are feet)"
         return (
-            f"{_cells(self._odd)} {values}, outside the {self._lowest:g} to {self._highest:g} "
-            f"{unit} of land on Earth{feet}; left as they are: if they are voids, add {remedy}"
+            f"{self._holders(self._odd)} {values}, outside the {self._lowest:g} to "
+            f"{self._highest:g} {unit} of land on Earth{feet}; left as they are: "
+            f"if they are voids, add {remedy}"
         )
-
-
-def _cells(count):
-    return "1 cell holds" if count == 1 else f"{count} cells hold"

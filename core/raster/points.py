@@ -144,8 +144,9 @@ def _write_layer(path, columns, crs, field, progress):
         try:
             if dataset is not None:
                 reference = spatial_reference(crs, heard) if crs else None
+                name = os.path.splitext(os.path.basename(path))[0]
                 layer = heard.attempt(
-                    dataset.CreateLayer, "points", reference, ogr.wkbPoint25D,
+                    dataset.CreateLayer, name, reference, ogr.wkbPoint25D,
                     _LAYER_OPTIONS[driver.ShortName],
                 )  # fmt: skip
                 _fill_layer(dataset, layer, columns, field, heard, progress)

@@ -8,12 +8,13 @@ from demsmith.core.errors import InputError
 from demsmith.core.progress import SILENT, checkpoint
 from demsmith.core.raster._gdal import load, numpy_type
 from demsmith.core.raster.crs import crs_units
-from demsmith.core.raster.grid import NO_GEOTRANSFORM, Grid
+from demsmith.core.raster.grid import NO_GEOTRANSFORM, Grid, check_same_grid
 from demsmith.core.raster.nodata import VoidFinder, metres_per_unit
 from demsmith.core.raster.opening import choose_band, opened
 from demsmith.core.raster.raster import BandMeta, Raster
 
 _BLOCK_CELLS = 1 << 21
+_MASK_TOLERANCE = 0.51  # pixels: programs disagree on whether a coordinate is a corner or a centre
 _EXACT_INTEGERS = 1 << 53  # every integer up to here is a float64
 
 
@@ -52,11 +53,33 @@ def read(path, *, band=1, nodata=(), below=None, above=None, mask=None, progress
         the mask does not fit.
     """
     path = os.fspath(path)
-    rules = dict(
-        nodata=tuple(nodata) if np.iterable(nodata) else (nodata,), below=below, above=above
-    )
+    rules = dict(nodata=nodata, below=below, above=above)
     with opened(path) as (heard, holder):
         return _read_band(path, holder[0], band, heard, progress, rules, mask)
+
+
+def read_grid(path):
+    """Read where the cells of a raster lie, and nothing of what they hold.
+
+    Parameters
+    ----------
+    path : str or path-like
+        As in `read`.
+
+    Returns
+    -------
+    Grid
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged, rotated or holds no band.
+    """
+    path = os.fspath(path)
+    with opened(path) as (_, holder):
+        choose_band(holder[0], 1, path)
+        grid, _, _ = _grid(holder[0], path)
+        return grid
 
 
 def _read_band(path, dataset, number, heard, progress, rules, mask):
@@ -70,7 +93,7 @@ def _read_band(path, dataset, number, heard, progress, rules, mask):
         meta,
         **rules,
         metres=metres_per_unit(meta.unit, units.vertical_unit),
-        earth=6.3e6 < units.ellipsoid.radius < 6.4e6,
+        earth=units.on_earth,
     )
     step = _rows_per_block(band, grid.shape)
     for start in range(0, grid.shape.rows, step):
@@ -85,17 +108,9 @@ def _read_band(path, dataset, number, heard, progress, rules, mask):
 def _masked(path, grid, source):
     """Read which cells of a raster on ``grid`` the mask at ``path`` calls voids."""
     mask = read(path)
-    if mask.grid.shape != grid.shape:
-        raise InputError(
-            f"mask '{path}' has {mask.grid.shape.rows} × {mask.grid.shape.columns} cells, "
-            f"'{source}' has {grid.shape.rows} × {grid.shape.columns}"
-        )
-    if mask.grid.georeferenced and grid.georeferenced:
-        _, width, _, _, _, height = grid.geotransform
-        for row, column in ((0, 0), (grid.shape.rows - 1, grid.shape.columns - 1)):
-            here, there = grid.xy(row, column), mask.grid.xy(row, column)
-            if abs(here.x - there.x) > abs(width) / 2 or abs(here.y - there.y) > abs(height) / 2:
-                raise InputError(f"mask '{path}' lies elsewhere than '{source}'")
+    check_same_grid(
+        mask.grid, grid, what=f"mask '{path}'", whose=f"'{source}'", tolerance=_MASK_TOLERANCE
+    )
     return (mask.values != 0) & ~mask.void
 
 

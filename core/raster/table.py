@@ -15,8 +15,12 @@ from demsmith.core.raster.features import ELEVATION_NAMES, Features, columns_nam
 from demsmith.core.raster.opening import check_there
 
 _EXTENSIONS = (".csv", ".tsv", ".txt", ".xyz", ".dat")
-_X_NAMES = ("x", "lon", "long", "longitude", "lng", "easting", "east", "e")
-_Y_NAMES = ("y", "lat", "latitude", "northing", "north", "n")
+_X_NAMES = (
+    "x", "lon", "long", "longitude", "lng", "easting", "east", "e", "xcoord", "x_coord", "point_x",
+)  # fmt: skip
+_Y_NAMES = (
+    "y", "lat", "latitude", "northing", "north", "n", "ycoord", "y_coord", "point_y",
+)  # fmt: skip
 _DELIMITERS = (";", "\t", ",", None)  # None: blanks; a comma may also be the decimal mark
 _UNKNOWN = ("", "nan", "na", "n/a", "null", "none", "-")
 _BYTE_ORDER_MARKS = (
@@ -151,7 +155,11 @@ def _fields(line, delimiter):
     """Part a line into its columns, as text."""
     if delimiter is None:
         return line.split()
-    return [field.strip() for field in next(csv.reader([line.strip("\r\n ")], delimiter=delimiter))]
+    try:
+        fields = next(csv.reader([line.strip("\r\n ")], delimiter=delimiter))
+    except csv.Error:  # larger than a field may be: no row of a table
+        return []
+    return [field.strip() for field in fields]
 
 
 def _number(text, delimiter):
@@ -196,7 +204,8 @@ def _columns(names, wanted, path):
         if any(usual):
             axis = "xyz"[columns.index(None)]
             raise InputError(
-                f"which column of '{path}' is {axis}? Name it (option {axis}); there are: {listed}"
+                f"which column of '{path}' is {axis}? Tell its name, or call it {axis} in the "
+                f"file; there are: {listed}"
             )
         columns = [place if column is None else column for place, column in enumerate(columns)]
         if names and wanted == (None, None, None):

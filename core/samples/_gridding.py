@@ -45,7 +45,7 @@ def _add_segment(u, v, z, a, b, sums, counts):
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def add_lines(u, v, z, first, sums, counts):
+def add_lines(u, v, z, first, sums, counts, entering):
     """Add lines: each to one cell a column, or a row, whichever its segments run along.
 
     Parameters
@@ -59,6 +59,8 @@ def add_lines(u, v, z, first, sums, counts):
         Elevations where the lines pass the cells' centres are added here. A line so short that it
         passes none adds its first vertex.
     counts : (H, W) int32 array
+    entering : (L,) bool array
+        Is told which lines have a cell of the grid.
     """
     for line in range(first.size - 1):
         begin, end = first[line], first[line + 1]
@@ -66,7 +68,8 @@ def add_lines(u, v, z, first, sums, counts):
         for a in range(begin, end - 1):
             added |= _add_segment(u, v, z, a, a + 1, sums, counts)
         if not added and begin < end:
-            _add(math.floor(v[begin]), math.floor(u[begin]), z[begin], sums, counts)
+            added = _add(math.floor(v[begin]), math.floor(u[begin]), z[begin], sums, counts)
+        entering[line] = added
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

@@ -7,10 +7,10 @@ import numpy as np
 from demsmith.core import parallel
 from demsmith.core.errors import InputError
 from demsmith.core.progress import SILENT, Span, checkpoint
+from demsmith.core.samples.samples import usable
 from demsmith.core.samples.sketch import laid_over
 
 _AT_ONCE = 500_000  # vertices between two checkpoints
-_ABSURD = 1e30  # as in rasters: what stands there for no value
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,8 @@ class Gridded:
     contour : (H, W) bool array or None
         Cells on a contour line; None without such lines.
     used, outside, unusable : int
-        Samples in the grid, beyond it, and with a coordinate or elevation that is not finite.
+        Samples in the grid, beyond it, and with a coordinate or elevation that is not finite. All
+        vertices of a line that has a cell of the grid are used, for they lead it there.
     shared : int
         Cells that hold several points.
     deviation : float
@@ -77,14 +78,16 @@ def to_cells(samples, grid, sketch=None, *, progress=SILENT):
     if sketch is not None:
         laid = laid_over(sketch, grid)
         _lay(laid, np.isfinite(laid), values, known)
-    contour = _lay_lines(samples.contours, grid, values, known, Span(progress, 0, 0.4))
-    _lay_lines(samples.lines, grid, values, known, Span(progress, 0.4, 0.6))
+    contour, beyond = _lay_lines(samples.contours, grid, values, known, Span(progress, 0, 0.4))
+    _, besides = _lay_lines(samples.lines, grid, values, known, Span(progress, 0.4, 0.6))
     if samples.cells is not None:
         if samples.cells.shape != shape:
             raise InputError(f"cells {samples.cells.shape} do not have the grid's shape {shape}")
         _lay(samples.cells, np.isfinite(samples.cells), values, known)
-    shared, deviation = _lay_points(samples.points, grid, values, known, Span(progress, 0.6, 1))
-    outside, unusable = _count_lost(samples, grid)
+    points = samples.points[usable(samples.points)]
+    inside, shared, deviation = _lay_points(points, grid, values, known, Span(progress, 0.6, 1))
+    outside = beyond + besides + len(points) - inside
+    unusable = int(np.count_nonzero(~usable(samples.vertices())))
     used = len(samples) - outside - unusable
     return Gridded(values, known, contour, used, outside, unusable, shared, deviation)
 
@@ -104,29 +107,35 @@ def _lay_means(sums, counts, values, known):
 
 
 def _lay_lines(lines, grid, values, known, progress):
-    """Lay lines over the values; gives the cells they take, or None without lines."""
+    """Lay lines over the values.
+
+    Gives the cells they take, or None without lines; and how many vertices have the lines that
+    take none.
+    """
     from demsmith.core.samples._gridding import add_lines
 
     if not lines:
-        return None
-    lines = [line[_usable(line)] for line in lines]
+        return None, 0
     vertices = np.concatenate(lines)
+    good = usable(vertices)
+    first = np.concatenate([[0], np.cumsum(good)])[np.cumsum([0, *map(len, lines)])]
+    vertices = vertices[good]
     u, v = _cell_coordinates(vertices, grid)
-    first = np.cumsum([0, *map(len, lines)])
+    entering = np.zeros(len(lines), bool)
     sums, counts = np.zeros(values.shape), np.zeros(values.shape, np.int32)
     for begin, end in parallel.even_spans(np.diff(first) + 1, len(vertices) // _AT_ONCE + 1):
         checkpoint(progress, first[begin] / len(vertices))
-        add_lines(u, v, vertices[:, 2], first[begin : end + 1], sums, counts)
-    return _lay_means(sums, counts, values, known)
+        add_lines(u, v, vertices[:, 2], first[begin : end + 1], sums, counts, entering[begin:end])
+    beyond = int(np.diff(first)[~entering].sum())
+    return _lay_means(sums, counts, values, known), beyond
 
 
 def _lay_points(points, grid, values, known, progress):
-    """Lay points over the values; gives how many cells share some, and their deviation."""
+    """Lay points over the values; tells how many lie in the grid, cells that share, deviation."""
     from demsmith.core.samples._gridding import add_points, largest_deviation
 
-    points = points[_usable(points)]
     if not len(points):
-        return 0, 0.0
+        return 0, 0, 0.0
     u, v = _cell_coordinates(points, grid)
     z = points[:, 2]
     spans = parallel.even_spans(np.ones(len(points)), len(points) // _AT_ONCE + 1)
@@ -139,24 +148,10 @@ def _lay_points(points, grid, values, known, progress):
     for begin, end in spans:
         checkpoint(progress, 0.5 + 0.5 * begin / len(points))
         deviation = max(deviation, largest_deviation(u, v, z, begin, end, sums))
-    return int(np.count_nonzero(counts > 1)), deviation
+    return int(counts.sum()), int(np.count_nonzero(counts > 1)), deviation
 
 
 def _cell_coordinates(points, grid):
     """Give places as columns and rows, from the grid's outer corner on."""
     x_corner, width, _, y_corner, _, height = grid.geotransform
     return (points[:, 0] - x_corner) / width, (points[:, 1] - y_corner) / height
-
-
-def _usable(points):
-    return np.isfinite(points).all(axis=1) & (abs(points[:, 2]) < _ABSURD)
-
-
-def _count_lost(samples, grid):
-    """Count points and vertices beyond the grid, and those that are not finite."""
-    vertices = samples.vertices()
-    usable = _usable(vertices)
-    u, v = _cell_coordinates(vertices[usable], grid)
-    rows, columns = grid.shape
-    inside = (u >= 0) & (v >= 0) & (u <= columns) & (v <= rows)
-    return int(np.count_nonzero(~inside)), int(np.count_nonzero(~usable))

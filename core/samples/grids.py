@@ -9,6 +9,7 @@ import numpy as np
 from demsmith.core.errors import InputError
 from demsmith.core.raster.crs import crs_units
 from demsmith.core.raster.grid import Grid
+from demsmith.core.samples.samples import usable
 
 _BYTES_PER_CELL = 64  # what the variants take at most, the lattice around the grid included
 _MEMORY_UNKNOWN = 16 << 30
@@ -112,19 +113,19 @@ class GridWish:
             resolution = _pixel_size(extent, sketch)
         else:
             raise InputError(_resolution_missing(extent, sources, crs))
+        _refuse_coarse(extent, resolution, crs)
         if self.extent is None:
             extent = _widened(extent, resolution)
-        _refuse_coarse(extent, resolution, crs)
         _refuse_giant(extent, resolution)
         return Grid.of_extent(extent, resolution, crs)
 
 
 def _bounds(sources, crs):
     """Give the extent of the samples, as far as they are finite."""
-    xy = np.concatenate([source.scattered(crs).vertices()[:, :2] for source in sources])
-    xy = xy[np.isfinite(xy).all(axis=1)]
+    vertices = np.concatenate([source.scattered(crs).vertices() for source in sources])
+    xy = vertices[usable(vertices), :2]
     if not xy.size:
-        raise InputError("no sample has finite coordinates")
+        raise InputError("no sample has finite coordinates and elevation")
     return (*xy.min(axis=0), *xy.max(axis=0))
 
 

@@ -21,9 +21,8 @@ from demsmith.core.samples.samples import Samples
 from demsmith.core.samples.sketch import read_sketch
 from demsmith.core.samples.sources import read_sources
 from demsmith.core.samples.terrain import from_samples
-from demsmith.core.voids.filling import FILLED, ORIGINAL
+from demsmith.core.voids.filling import FILLED, ORIGINAL, SOURCE_COLORS
 
-_SOURCE_COLORS = {ORIGINAL: (217, 217, 217, 255), FILLED: (214, 24, 111, 255)}
 _ELEVATIONS = raster.BandMeta(unit="m", description="elevation")
 _SOURCE_NAMES = ("sample", "made between samples")
 
@@ -40,7 +39,8 @@ class SamplesResult:
     version : str
         Demsmith's.
     samples, samples_outside : int
-        Points, vertices and known cells of rasters that lie in the grid, and beyond it.
+        Points, vertices and known cells of rasters in the grid, and beyond it; see
+        `Reconstructed`.
     rows, columns, cells, cells_known, cells_filled : int
         The grid's; cells that hold a sample or a sketch's paint, and all others.
     tuning : dict or None
@@ -108,8 +108,10 @@ def samples_file(
         one cell for each pixel.
     crs : str
         Of the output; default: of the first raster, else of the first input that has one.
-    band, nodata, below, above, mask
-        Of rasters, as in `demsmith.read_raster`.
+    nodata, below, above
+        Elevations that mean none, as in `demsmith.read_raster`.
+    band, mask
+        Of rasters, as there.
     maps : mapping of str to path, optional
         Rasters of parameters that change from cell to cell, by their names, as in
         `demsmith.core.mcmd.read_maps`.
@@ -143,7 +145,7 @@ def samples_file(
     inputs, contours = _listed(inputs), _listed(contours)
     files = (*inputs, *contours, sketch, like, mask, *(maps or {}).values())
     paths = _checked_outputs(files, output, source_map, overwrite)
-    wish = GridWish(None if like is None else raster.read(like).grid, extent, resolution, crs)
+    wish = GridWish(None if like is None else raster.read_grid(like), extent, resolution, crs)
     sources, crs = read_sources(
         inputs, contours, crs=wish.target, source_crs=source_crs, layer=layer, field=field,
         band=band, nodata=nodata, below=below, above=above, mask=mask,
@@ -155,8 +157,8 @@ def samples_file(
     grid = wish.decide(sources, crs, painted)
     made = from_samples(
         _together(sources, grid), grid, options=options, sketch=painted,
-        maps=read_maps(maps, grid) if maps else None, threads=threads,
-        progress=Span(progress, 0.2, 0.8),
+        maps=read_maps(maps or {}, grid, progress=Span(progress, 0.2, 0.25)), threads=threads,
+        progress=Span(progress, 0.25, 0.8),
     )  # fmt: skip
     _write(
         made, *_stored(made, sources, options), paths, Span(progress, 0.8, 1),
@@ -220,7 +222,7 @@ def _write(made, values, like, paths, progress, **how):
             raster.write(
                 part["source_map"], np.where(made.known, ORIGINAL, FILLED).astype(np.uint8),
                 dtype="uint8", nodata=None, description="source", same_quantity=False,
-                color_table=_SOURCE_COLORS, categories=_SOURCE_NAMES,
+                color_table=SOURCE_COLORS, categories=_SOURCE_NAMES,
                 progress=Span(progress, 0.8, 1), **how,
             )  # fmt: skip
         checkpoint(progress, 1.0)
@@ -228,6 +230,8 @@ def _write(made, values, like, paths, progress, **how):
 
 def _result(made, sources, paths, begin):
     notes = [note for source in sources for note in source.notes]
+    if made.samples and not made.grid.crs:
+        notes.append("the output has no CRS; its coordinates are taken as metres")
     if made.tuned and not made.tuned.accepted:
         notes.append(made.tuned.summary())
     return SamplesResult(

@@ -3,10 +3,20 @@
 from dataclasses import dataclass
 
 from demsmith.core.mcmd.options import McmdOptions
-from demsmith.core.options import option
+from demsmith.core.options import option, specifications
 from demsmith.core.samples.presets import PRESETS
 
 VARIANTS = ("converged", "relaxed", "weighted", "paper")
+
+
+def _as_preset(name):
+    """Make the field of an option of MCMD's that presets set, to which None is not given."""
+    spec = next(spec for spec in specifications(McmdOptions) if spec.name == name)
+    return option(
+        spec.kind, None, spec.title,
+        f"{spec.help} Not given: the preset's, else what noise alone needs, else {spec.default:g}.",
+        minimum=spec.minimum, maximum=spec.maximum, advanced=True,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,6 +33,11 @@ class SampleOptions(McmdOptions):
         "finest level first; paper: the bottom-up pass as published.",
         choices=VARIANTS, advanced=True,
     )  # fmt: skip
+    l: float = _as_preset("l")  # noqa: E741, the paper's name
+    l_bu: float = _as_preset("l_bu")
+    h: float = _as_preset("h")
+    r_s: float = _as_preset("r_s")
+    r_t: float = _as_preset("r_t")
     stiffness: float = option(
         float, None, "Stiffness length [m]",
         "Distance over which curvature changes smoothly: more suits ground that was measured "
@@ -31,8 +46,8 @@ class SampleOptions(McmdOptions):
     )  # fmt: skip
     preset: str = option(
         str, "none", "Preset",
-        "Parameters of a figure of the paper: variant paper with its l, l_bu, h, r_t and r_s, "
-        "where these are not set to other values than their defaults.",
+        "Parameters of a figure of the paper: its l, l_bu, h, r_t and r_s, where these are not "
+        "given, and variant paper instead of converged.",
         choices=("none", *PRESETS),
     )  # fmt: skip
     tune: bool = option(

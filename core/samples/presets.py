@@ -3,7 +3,8 @@
 from dataclasses import dataclass, replace
 
 from demsmith.core.errors import InputError
-from demsmith.core.options import specifications
+from demsmith.core.mcmd.maps import MAP_NAMES
+from demsmith.core.mcmd.options import McmdOptions
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ FROM_NOISE = {"h": 0.45, "r_s": 1.0, "relief": 1000.0}
 
 
 def with_preset(options):
-    """Put a preset's values into the options that are at their defaults.
+    """Put a preset's values where the options give none.
 
     Parameters
     ----------
@@ -51,40 +52,39 @@ def with_preset(options):
     Returns
     -------
     SampleOptions
-        Of variant ``paper``, unless the options name another.
+        Of variant ``paper`` instead of ``converged``, which has no curves.
 
     Raises
     ------
     InputError
-        If the options name a variant that has no curves.
+        If the options name variant ``relaxed``, which has none either.
     """
     if options.preset == "none":
         return options
-    preset = PRESETS[options.preset]
-    options = _where_default(
-        options, variant="paper", l=preset.l, l_bu=preset.l_bu, h=preset.h, r_t=preset.r_t,
-        r_s=preset.r_s,
-    )  # fmt: skip
     if options.variant == "relaxed":
         raise InputError(
             f"preset {options.preset} bends the surface by l and l_bu, which variant relaxed has "
             "not: choose variant paper or weighted, or no preset"
         )
-    return options
+    if options.variant == "converged":
+        options = replace(options, variant="paper")
+    preset = PRESETS[options.preset]
+    return _where_none(
+        options, l=preset.l, l_bu=preset.l_bu, h=preset.h, r_t=preset.r_t, r_s=preset.r_s
+    )
 
 
 def from_noise(options):
-    """Put what is needed without any known cell into the options that are at their defaults."""
-    return _where_default(options, **FROM_NOISE)
+    """Put what is needed without any known cell where the options give nothing."""
+    return _where_none(options, **FROM_NOISE)
 
 
-def _where_default(options, **values):
-    defaults = {spec.name: spec.default for spec in specifications(type(options))}
-    return replace(
-        options,
-        **{
-            name: value
-            for name, value in values.items()
-            if getattr(options, name) == defaults[name]
-        },
-    )
+def settled(options):
+    """Put MCMD's own defaults where the options still give nothing."""
+    defaults = McmdOptions()
+    return _where_none(options, **{name: getattr(defaults, name) for name in MAP_NAMES})
+
+
+def _where_none(options, **values):
+    wanted = {name: value for name, value in values.items() if getattr(options, name) is None}
+    return replace(options, **wanted)

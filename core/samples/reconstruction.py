@@ -16,6 +16,7 @@ from demsmith.core.mcmd import (
 )
 from demsmith.core.options import validate
 from demsmith.core.progress import SILENT, Span
+from demsmith.core.samples.presets import settled
 from demsmith.core.voids import FillOptions, fill_voids
 
 
@@ -56,6 +57,7 @@ def reconstruct(
         If ``progress`` asks to stop.
     """
     validate(options)
+    options = settled(options)
     common = dict(
         pixel_size=pixel_size, lattice=lattice or Lattice.covering(values.shape), threads=threads
     )
@@ -88,11 +90,13 @@ def _from_noise(known, options, maps, *, lattice, pixel_size, threads, progress)
 
 def _converged(values, known, options, maps, *, lattice, pixel_size, threads, progress):
     by_cell = (maps or Maps()).over(options, known.shape)
-    # Noise comes last, or the energy's descent would smooth it away; and it is refused here what
-    # the relaxed variant refuses.
-    quiet = _fill_options(options, variant="relaxed", r_s=0.0)
+    if np.any(by_cell.l) or np.any(by_cell.l_bu):
+        raise InputError(
+            "l and l_bu bend the variants 'weighted' and 'paper'; 'converged' has no such curve"
+        )
+    # Noise comes last, or the energy's descent would smooth it away.
     start = fill_voids(
-        values, ~known, options=quiet, maps=maps and Maps(l=maps.l, l_bu=maps.l_bu),
+        values, ~known, options=_fill_options(options, variant="relaxed", r_s=0.0),
         pixel_size=pixel_size, lattice=lattice, threads=threads, progress=Span(progress, 0, 0.2),
     )  # fmt: skip
     found = converge(

@@ -6,6 +6,7 @@ import numpy as np
 
 from demsmith.core.elevations import checked
 from demsmith.core.errors import InputError
+from demsmith.core.raster.nodata import HUGE
 
 _LEVEL = 1e-3  # metres by which digits lost in a file may move a contour's vertices
 
@@ -72,6 +73,20 @@ class Samples:
     def vertices(self):
         """Give points and vertices in one (N, 3) array."""
         return np.concatenate([self.points, *self.lines, *self.contours])
+
+    def without(self, unwanted):
+        """Give the same without the elevations of some `vertices`, told by an (N,) bool array."""
+        vertices = self.vertices()
+        vertices[unwanted, 2] = np.nan
+        ends = np.cumsum([len(each) for each in (self.points, *self.lines, *self.contours)])
+        points, *lines = np.split(vertices, ends[:-1])
+        count = len(self.lines)
+        return Samples(points, lines[:count], lines[count:], self.cells)
+
+
+def usable(vertices):
+    """Tell which rows of x, y and elevation are finite; elevations beyond 1e30 stand for none."""
+    return np.isfinite(vertices).all(axis=1) & (abs(vertices[:, 2]) <= HUGE)
 
 
 def _triples(values, name):

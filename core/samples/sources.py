@@ -1,14 +1,15 @@
 """Samples from files: tables, vector layers, and rasters of which some cells are known."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from demsmith.core import raster
 from demsmith.core.errors import InputError
 from demsmith.core.progress import SILENT, Span
-from demsmith.core.raster.crs import reproject
+from demsmith.core.raster.crs import crs_units, reproject
+from demsmith.core.raster.nodata import VoidFinder
 from demsmith.core.raster.opening import opened
 from demsmith.core.raster.samples_file import read_samples_file
 from demsmith.core.raster.table import is_table
@@ -52,8 +53,9 @@ class Source:
 
 
 def read_sources(
-    inputs, contours, *, crs="", source_crs="", layer=None, field=None, progress=SILENT, **reading
-):
+    inputs, contours, *, crs="", source_crs="", layer=None, field=None, band=1, mask=None,
+    progress=SILENT, **voids,
+):  # fmt: skip
     """Read all inputs, bringing points and lines to one CRS.
 
     Parameters
@@ -69,8 +71,10 @@ def read_sources(
         CRS of files that do not tell theirs.
     layer, field : str, optional
         As in `demsmith.core.raster.read_features`; of every vector file.
-    **reading
+    band, mask
         As in `demsmith.core.raster.read`; of every raster.
+    **voids
+        ``nodata``, ``below`` and ``above`` as there; of every input.
 
     Returns
     -------
@@ -91,18 +95,20 @@ def read_sources(
     features = dict(layer=layer, field=field, source_crs=source_crs)
     sources = []
     for path in rasters:
-        sources.append(_read_raster(path, reading, _part(progress, len(sources), total)))
+        part = _part(progress, len(sources), total)
+        sources.append(_read_raster(path, band=band, mask=mask, progress=part, **voids))
         crs = crs or sources[-1].crs
     for each, read in (
         *((each, _read_features) for each in others),
         *((each, _read_contours) for each in contours),
     ):
         if isinstance(each, Samples):
-            sources.append(Source(each))
-            continue
-        part = _part(progress, len(sources), total)
-        sources.append(read(each, crs=crs, progress=part, **features))
-        crs = crs or sources[-1].crs
+            source, about = Source(each, crs=crs), ""
+        else:
+            part = _part(progress, len(sources), total)
+            source, about = read(each, crs=crs, progress=part, **features), f"'{each}': "
+        sources.append(_without_voids(source, about, voids))
+        crs = crs or source.crs
     return sources, crs
 
 
@@ -137,8 +143,25 @@ def _read_contours(path, **how):
     return Source(samples, crs=features.crs, notes=features.notes)
 
 
-def _read_raster(path, reading, progress):
-    thinned = raster.read(path, progress=progress, **reading)
+def _without_voids(source, about, voids):
+    """Take away the elevations that mean none; notes name those that may mean none."""
+    vertices = source.samples.vertices()
+    if not len(vertices):
+        return source
+    units = crs_units(source.crs)
+    finder = VoidFinder(
+        raster.BandMeta(vertices.dtype), metres=units.vertical_unit, earth=units.on_earth,
+        noun="sample", **voids,
+    )  # fmt: skip
+    void = np.zeros(len(vertices), bool)
+    finder.find(vertices[:, 2], void)
+    samples = source.samples.without(void) if void.any() else source.samples
+    notes = tuple(f"{about}{note}" for note in finder.notes())
+    return replace(source, samples=samples, notes=(*source.notes, *notes))
+
+
+def _read_raster(path, **reading):
+    thinned = raster.read(path, **reading)
     if thinned.void.all():
         raise InputError(f"'{path}' has no known cell")
     return Source(Samples(), thinned, thinned.grid.crs, thinned.notes)

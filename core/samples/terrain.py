@@ -6,18 +6,18 @@ import numpy as np
 
 from demsmith.core import parallel
 from demsmith.core.errors import InputError
-from demsmith.core.options import validate
+from demsmith.core.options import options_from
 from demsmith.core.progress import SILENT, Span, checkpoint
 from demsmith.core.raster.grid import Grid
 from demsmith.core.samples.contours import with_sides
 from demsmith.core.samples.gridding import to_cells
 from demsmith.core.samples.grids import extent_of
 from demsmith.core.samples.options import SampleOptions
-from demsmith.core.samples.presets import PRESETS, from_noise, with_preset
+from demsmith.core.samples.presets import PRESETS, from_noise, settled, with_preset
 from demsmith.core.samples.reconstruction import reconstruct
 from demsmith.core.samples.samples import Samples
 
-_BLOCK_CELLS = 1 << 20
+_BLOCK_CELLS = 1 << 17
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,8 @@ class Reconstructed:
         Cells that hold a sample; ``values`` has its elevation there.
     grid : Grid
     samples, samples_outside : int
-        Points, vertices and known cells in the grid, and beyond it.
+        Points, vertices and known cells in the grid, and beyond it; all vertices of a line that
+        has a cell of the grid count as in it.
     notes : tuple of str
         What is odd, one sentence each.
     tuned : demsmith.core.tuning.Tuned or None
@@ -100,13 +101,14 @@ def from_samples(
     >>> float(terrain.values[8, 8]), terrain.cells_known
     (180.0, 4)
     """
-    options = with_preset(_options(options, parameters))
+    options = with_preset(options_from(SampleOptions, options, parameters, "from_samples"))
     held = samples if isinstance(samples, Samples) else Samples(() if samples is None else samples)
     gridded = to_cells(held, grid, sketch, progress=Span(progress, 0, 0.1))
     if not gridded.known.any():
         if samples is not None or sketch is not None:
             raise InputError(_why_none(held, gridded, grid, sketch))
         options = from_noise(options)
+    options = settled(options)
     surroundings = dict(pixel_size=grid.pixel_size_m(), lattice=lattice, threads=threads)
     tuned = None
     if options.tune:
@@ -121,19 +123,6 @@ def from_samples(
         values.astype(gridded.values.dtype, copy=False), gridded.known, grid, gridded.used,
         gridded.outside, _notes(gridded), tuned,
     )  # fmt: skip
-
-
-def _options(options, parameters):
-    if options is None:
-        try:
-            options = SampleOptions(**parameters)
-        except TypeError as error:
-            message = str(error).replace("SampleOptions.__init__()", "from_samples")
-            raise InputError(message) from None
-    elif parameters:
-        raise InputError(f"give options or {', '.join(parameters)}, not both")
-    validate(options)
-    return options
 
 
 def _why_none(samples, gridded, grid, sketch):
@@ -206,8 +195,9 @@ def _notes(gridded):
             "left out"
         )
     if gridded.deviation > 0:
+        cells = "1 cell holds" if gridded.shared == 1 else f"{gridded.shared} cells hold"
         notes.append(
-            f"{gridded.shared} cells hold several points and take their mean, from which these "
-            f"are up to {gridded.deviation:.4g} m"
+            f"{cells} several points; the mean is taken, from which these are up to "
+            f"{gridded.deviation:.4g} m"
         )
     return tuple(notes)

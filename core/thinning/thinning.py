@@ -1,14 +1,14 @@
 """Thinning an elevation array: a share of its cells is kept, exactly as they are."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from demsmith.core.elevations import checked
 from demsmith.core.errors import InputError
 from demsmith.core.mcmd.lattice import metres
-from demsmith.core.options import validate
+from demsmith.core.options import options_from
 from demsmith.core.progress import SILENT, Span, checkpoint
 from demsmith.core.thinning.detectors import random_scores, ridge_scores, sobel_scores
 from demsmith.core.thinning.options import ThinOptions
@@ -52,7 +52,7 @@ def thin(
         True where there is no elevation. Cells that are not finite are voids in any case, and
         those of a masked array where this is not given.
     options : ThinOptions, optional
-        How many and which; its fields can as well be given as keywords of their own, which win.
+        How many and which; its fields can as well be given as keywords of their own.
     pixel_size : float, (float, float) or (array, array), optional
         Ground metres per cell: both ways, or east-west and north-south, each one number or one by
         row. Default: 1.
@@ -83,8 +83,7 @@ def thin(
     >>> thinned.cells_kept, thinned.kept[:, 9:11].all()
     (40, True)
     """
-    options = replace(options or ThinOptions(), **parameters)
-    validate(options)
+    options = options_from(ThinOptions, options, parameters, "thin")
     values, void = checked(values, void)
     sizes = metres(values.shape, pixel_size)
     known = ~void

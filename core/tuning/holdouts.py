@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from demsmith.core import parallel
-from demsmith.core.progress import SILENT, Span, checkpoint
+from demsmith.core.progress import SILENT, Muted, Span, checkpoint
 from demsmith.core.tuning.score import Holes, classify
 from demsmith.core.voids.labelling import find_voids
 from demsmith.core.voids.validation import SIZE_CLASSES, punch_voids
@@ -129,7 +129,7 @@ def _punch(values, known, count, threads, progress):
     masks = [np.zeros(values.shape, bool)] * count
 
     def punch(seed):
-        masks[seed] = punch_voids(values, known=known, seed=seed)
+        masks[seed] = punch_voids(values, known=known, seed=seed, progress=Muted(progress))
 
     if known.any():
         parallel.run(

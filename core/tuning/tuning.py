@@ -175,9 +175,10 @@ def tune_samples(
     InputError, DependencyError, Cancelled
         As `tune_fill` does.
     """
+    from demsmith.core.samples.presets import settled
     from demsmith.core.samples.reconstruction import reconstruct
 
-    raster = _Raster(values, known, options, maps, pixel_size)
+    raster = _Raster(values, known, settled(options), maps, pixel_size)
     most_cells = max(_SAMPLE_CELLS, known.size * _SAMPLES // max(np.count_nonzero(known), 1))
     holdouts = sampled_holdouts(
         known, count=3, most_cells=most_cells, progress=Span(progress, 0, 0.1)

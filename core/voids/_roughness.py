@@ -1,4 +1,4 @@
-"""Kernels of the structure function around voids and within them, and of scaled roughness."""
+"""Kernels of the roughness around voids and within them, and of what is added to them."""
 
 import numba
 import numpy as np
@@ -8,15 +8,17 @@ _JIT = dict(nogil=True, cache=True, error_model="numpy")
 
 @numba.njit(**_JIT)
 def squares_around(begin, end, values, labels, runs, first_run, lags, out, margin):
-    """Write the mean squared difference of known cells around voids ``begin`` to ``end``.
+    """Write the mean squared second difference of known cells around some voids.
 
-    Pairs of cells stand some ``lags`` apart, in a row or a column, both within ``margin`` of the
-    void's bounding box and known.
+    That is of three cells, in a row or a column, each ``lag`` cells from the next, all known and
+    within ``margin`` of the void's bounding box.
 
     Parameters
     ----------
+    begin, end : int
+        Voids.
     out : (V, lags) float64 array
-        NaN where there is no pair.
+        NaN where there are no three such cells.
     """
     height, width = labels.shape
     for void in range(begin, end):
@@ -33,19 +35,29 @@ def squares_around(begin, end, values, labels, runs, first_run, lags, out, margi
                 for column in range(left, right):
                     if labels[row, column]:
                         continue
-                    here = np.float64(values[row, column])
-                    if row + lag < bottom and not labels[row + lag, column]:
-                        total += (values[row + lag, column] - here) ** 2
+                    twice = 2 * np.float64(values[row, column])
+                    up, down = row - lag, row + lag
+                    if (
+                        up >= top
+                        and down < bottom
+                        and not (labels[up, column] or labels[down, column])
+                    ):
+                        total += (values[up, column] - twice + values[down, column]) ** 2
                         count += 1
-                    if column + lag < right and not labels[row, column + lag]:
-                        total += (values[row, column + lag] - here) ** 2
+                    west, east = column - lag, column + lag
+                    if (
+                        west >= left
+                        and east < right
+                        and not (labels[row, west] or labels[row, east])
+                    ):
+                        total += (values[row, west] - twice + values[row, east]) ** 2
                         count += 1
             out[void, n] = total / count if count else np.nan
 
 
 @numba.njit(**_JIT)
 def squares_within(begin, end, values, labels, runs, first_run, lags, out):
-    """Write the same of the cells of each void, whose label both must carry."""
+    """Write the same of the cells of each void, whose label all three must carry."""
     height, width = labels.shape
     for void in range(begin, end):
         for n in range(lags.size):
@@ -54,12 +66,22 @@ def squares_within(begin, end, values, labels, runs, first_run, lags, out):
             for k in range(first_run[void], first_run[void + 1]):
                 row = runs[k, 0]
                 for column in range(runs[k, 1], runs[k, 2]):
-                    here = np.float64(values[row, column])
-                    if row + lag < height and labels[row + lag, column] == void + 1:
-                        total += (values[row + lag, column] - here) ** 2
+                    twice = 2 * np.float64(values[row, column])
+                    up, down = row - lag, row + lag
+                    if (
+                        up >= 0
+                        and down < height
+                        and (labels[up, column] == void + 1 and labels[down, column] == void + 1)
+                    ):
+                        total += (values[up, column] - twice + values[down, column]) ** 2
                         count += 1
-                    if column + lag < width and labels[row, column + lag] == void + 1:
-                        total += (values[row, column + lag] - here) ** 2
+                    west, east = column - lag, column + lag
+                    if (
+                        west >= 0
+                        and east < width
+                        and (labels[row, west] == void + 1 and labels[row, east] == void + 1)
+                    ):
+                        total += (values[row, west] - twice + values[row, east]) ** 2
                         count += 1
             out[void, n] = total / count if count else np.nan
 
@@ -78,6 +100,34 @@ def soften_rims(begin, end, noise, labels, runs, first_run, share):
                 or (column + 1 < width and not labels[row, column + 1])
             ):
                 noise[row, column] *= share
+
+
+@numba.njit(**_JIT)
+def smooth(begin, end, noise, labels, runs, first_run):
+    """Smooth the noise of each void by 1-6-1 along rows and columns, as if nought all around."""
+    for void in range(begin, end):
+        a, b = first_run[void], first_run[void + 1]
+        left, right = runs[a, 1], runs[a, 2]
+        for k in range(a, b):
+            left, right = min(left, runs[k, 1]), max(right, runs[k, 2])
+        top = runs[a, 0] - 1
+        # The void and a cell around it, smoothed along rows.
+        along = np.zeros((runs[b - 1, 0] - top + 2, right - left + 2))
+        for k in range(a, b):
+            row = runs[k, 0] - top
+            for column in range(runs[k, 1], runs[k, 2]):
+                value = noise[runs[k, 0], column] / 8
+                at = column - left + 1
+                along[row, at - 1] += value
+                along[row, at] += 6 * value
+                along[row, at + 1] += value
+        for k in range(a, b):
+            row = runs[k, 0] - top
+            for column in range(runs[k, 1], runs[k, 2]):
+                at = column - left + 1
+                noise[runs[k, 0], column] = (
+                    along[row - 1, at] + 6 * along[row, at] + along[row + 1, at]
+                ) / 8
 
 
 @numba.njit(**_JIT)

@@ -7,7 +7,7 @@ import numpy as np
 from demsmith.core.elevations import checked
 from demsmith.core.errors import InputError
 from demsmith.core.mcmd import Lattice, Maps, displacement_of, interpolate, relax_voids
-from demsmith.core.options import validate
+from demsmith.core.options import options_from
 from demsmith.core.progress import SILENT, Span
 from demsmith.core.voids.labelling import Rims, Voids, find_voids, survey_rims
 from demsmith.core.voids.options import FillOptions
@@ -15,6 +15,13 @@ from demsmith.core.voids.roughness import Roughness, roughen
 
 ORIGINAL, FILLED, LEFT = 0, 1, 2
 """What a source map says of a cell: known before, filled, or a void that was left as it was."""
+
+SOURCE_COLORS = {
+    ORIGINAL: (217, 217, 217, 255),
+    FILLED: (214, 24, 111, 255),
+    LEFT: (0, 0, 0, 255),
+}
+"""Red, green, blue and alpha, 0 to 255, by which a source map shows them."""
 
 _BLOCK_CELLS = 1 << 20
 
@@ -136,7 +143,7 @@ def fill_voids(
     >>> filled.cells_filled
     6
     """
-    options = _options(options, parameters)
+    options = options_from(FillOptions, options, parameters, "fill_voids")
     values, void = checked(values, void)
     tuned = None
     if options.tune and void.any():
@@ -171,18 +178,6 @@ def fill_voids(
     if work is not out:
         _copy_cells(work, voids, selected, out)
     return Filled(out, voids, rims, selected, roughness, tuned)
-
-
-def _options(options, parameters):
-    if options is None:
-        try:
-            options = FillOptions(**parameters)
-        except TypeError as error:
-            raise InputError(str(error).replace("FillOptions.__init__()", "fill_voids")) from None
-    elif parameters:
-        raise InputError(f"give options or {', '.join(parameters)}, not both")
-    validate(options)
-    return options
 
 
 def _refuse_contradictions(options, by_cell):

@@ -12,15 +12,10 @@ from demsmith.core.errors import InputError
 from demsmith.core.mcmd import read_maps
 from demsmith.core.options import validate
 from demsmith.core.progress import SILENT, Span, checkpoint
-from demsmith.core.voids.filling import FILLED, LEFT, ORIGINAL, fill_voids
+from demsmith.core.voids.filling import SOURCE_COLORS, fill_voids
 from demsmith.core.voids.options import FillOptions
 from demsmith.core.voids.table import VoidTable, tabulate
 
-_SOURCE_COLORS = {
-    ORIGINAL: (217, 217, 217, 255),
-    FILLED: (214, 24, 111, 255),
-    LEFT: (0, 0, 0, 255),
-}
 _SOURCE_NAMES = ("original", "filled", "void left as it was")
 
 
@@ -144,7 +139,7 @@ def fill_file(
         if source_map:
             raster.write(
                 part["source_map"], filled.source(), dtype="uint8", nodata=None,
-                description="source", same_quantity=False, color_table=_SOURCE_COLORS,
+                description="source", same_quantity=False, color_table=SOURCE_COLORS,
                 categories=_SOURCE_NAMES, progress=Span(progress, 0.95, 1), **writing,
             )  # fmt: skip
         result = replace(result, seconds=round(time.perf_counter() - begin, 3))

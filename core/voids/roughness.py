@@ -1,8 +1,9 @@
 """Natural roughness: filled ground made as rough as the ground around each void.
 
-A fill is smoother than ground. What it lacks is measured by the structure function
-``D(h) = E[(z(p + h) - z(p))**2]`` of the known ground around the void, and added as random
-displacements (Belhadj 2007, equation 1), whose exponent and amplitude make the void's own
+A fill is smoother than ground. What it lacks is measured by the structure function of second
+differences, ``E[(z(p - h) - 2 z(p) + z(p + h))**2]``, of the known ground around the void: slopes,
+which a fill has, do not count in it, as they would in ``E[(z(p + h) - z(p))**2]``. It is added as
+random displacements (Belhadj 2007, equation 1), whose exponent and amplitude make the void's own
 structure function at lags of 1 to 8 cells that of its surroundings.
 """
 
@@ -19,9 +20,11 @@ from demsmith.core.progress import SILENT, Span
 LAGS = (1, 2, 4, 8)
 """Distances [cells] at which the roughness is matched."""
 
-# The exponents tried in each void, and how many of the finest levels are displaced: broader forms
-# are the fill's own.
-_EXPONENTS = (0.15, 0.3, 0.45, 0.6, 0.75)
+# The kinds tried in each void: exponent, and whether smoothed. Displacements alone have creases
+# along the lattice and at most the exponent of a broken line, which suits noisy plains; mountains
+# seen by radar are smoother from cell to cell.
+_KINDS = tuple((h, smooth) for smooth in (False, True) for h in (0.15, 0.45, 0.75))
+# How many of the finest levels are displaced: broader forms are the fill's own.
 _LEVELS = 4
 # The ground within so many cells of a void's bounding box is its surroundings.
 _MARGIN = 12
@@ -81,22 +84,22 @@ def roughen(values, voids, selected, *, seed=0, offsets=(0, 0), threads=None, pr
     wanted[selected] = work.around(values, Span(progress, 0, 0.2))[selected]
     there = work.within(values, Span(progress, 0.2, 0.3))
     fits = []
-    for h, part in zip(_EXPONENTS, _parts(progress, 0.3, 0.7), strict=True):
-        noise = work.displaced(selected, h, seed, Span(part, 0, 0.7))
+    for kind, part in zip(_KINDS, _parts(progress, 0.3, 0.7), strict=True):
+        noise = work.displaced(selected, kind, seed, Span(part, 0, 0.7))
         fits.append(_fit(wanted, there, work.within(noise, Span(part, 0.7, 1))))
     best = np.argmin([misfit for _, misfit in fits], axis=0)
     amplitude = np.array([amplitude for amplitude, _ in fits])[best, np.arange(best.size)]
-    # Noise is made anew rather than kept: memory for one field, not for each exponent.
+    # Noise is made anew rather than kept: memory for one field, not for each kind.
     for n, part in enumerate(_parts(progress, 0.7, 1)):
         chosen = np.flatnonzero((best == n) & (amplitude > 0))
-        noise = work.displaced(chosen, _EXPONENTS[n], seed, part)
+        noise = work.displaced(chosen, _KINDS[n], seed, part)
         work.add(values, noise, np.where(best == n, amplitude, 0.0))
-    return Roughness(np.array(_EXPONENTS)[best], amplitude)
+    return Roughness(np.array([h for h, _ in _KINDS])[best], amplitude)
 
 
 def _parts(progress, start, stop):
-    """Cut a part of the progress into one for each exponent."""
-    edges = np.linspace(start, stop, len(_EXPONENTS) + 1)
+    """Cut a part of the progress into one for each kind."""
+    edges = np.linspace(start, stop, len(_KINDS) + 1)
     return [Span(progress, a, b) for a, b in pairwise(edges)]
 
 
@@ -143,16 +146,19 @@ class _Work:
         self._run(squares_within, values, np.array(LAGS), out, progress=progress)
         return out
 
-    def displaced(self, selected, h, seed, progress):
-        """Give displacements of amplitude 1 at the finest level, half that at the rim."""
-        from demsmith.core.voids._roughness import soften_rims
+    def displaced(self, selected, kind, seed, progress):
+        """Give displacements of amplitude 1 at the finest level, quieter at the rim."""
+        from demsmith.core.voids._roughness import smooth, soften_rims
 
+        h, smoothed = kind
         displacement = Displacement(2.0 ** (2 * h * _LEVELS), h, 0.0, seed, _LEVELS)
         self.noise[self.voids.labels > 0] = 0.0
         displace(
             self.noise, self.voids, selected, displacement, self.offsets, self.threads,
             Span(progress, 0, 0.9),
         )  # fmt: skip
+        if smoothed:
+            self._run(smooth, self.noise)
         self._run(soften_rims, self.noise, _RIM_SHARE, progress=Span(progress, 0.9, 1))
         return self.noise
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from demsmith.core.errors import InputError
+from demsmith.core.progress import SILENT, checkpoint
 from demsmith.core.voids.labelling import find_voids
 
 SIZE_CLASSES = ((1, 16), (17, 100), (101, 1000), (1001, None))
@@ -14,7 +15,7 @@ SIZE_CLASSES = ((1, 16), (17, 100), (101, 1000), (1001, None))
 _MIXTURE = ((2, 0.012), (5, 0.016), (12, 0.016), (30, 0.01))
 
 
-def punch_voids(values, *, known=None, seed=0):
+def punch_voids(values, *, known=None, seed=0, progress=SILENT):
     """Punch voids such as the SRTM's radar shadows: many small, few large, mostly on slopes.
 
     Four times, smoothed noise plus half the standardised slope is cut at a quantile; the union is
@@ -27,6 +28,7 @@ def punch_voids(values, *, known=None, seed=0):
     known : (H, W) bool array, optional
         Where they are known; only there are voids punched. Default: everywhere.
     seed : int
+    progress : Progress
 
     Returns
     -------
@@ -36,16 +38,20 @@ def punch_voids(values, *, known=None, seed=0):
     ------
     InputError
         If nothing is known.
+    Cancelled
+        If ``progress`` asks to stop.
     """
     from scipy.ndimage import gaussian_filter
 
     rng = np.random.default_rng(seed)
     slope = _standard_slope(values, known)
     void = np.zeros(values.shape, bool)
-    for scale, share in _MIXTURE:
+    for done, (scale, share) in enumerate(_MIXTURE):
+        checkpoint(progress, done / len(_MIXTURE))
         noise = gaussian_filter(rng.standard_normal(values.shape), scale)
         field = noise / (noise.std() or 1.0) + 0.5 * gaussian_filter(slope, scale)
         void |= field > np.quantile(field, 1 - share)
+    checkpoint(progress, 1.0)
     return void if known is None else void & known
 
 

@@ -189,3 +189,18 @@ def test_a_window_of_terrain_from_nothing_is_the_same_terrain():
     whole = from_nothing((65, 65))
     window = from_nothing((20, 30), lattice=Lattice(-10, -5, 6))
     np.testing.assert_array_equal(window, whole[10:30, 5:35])
+
+
+def test_auto_scheme_is_triangle_edge_unless_nothing_is_known():
+    shape = (33, 33)
+    np.testing.assert_array_equal(from_nothing(shape), from_nothing(shape, scheme="diamond-square"))
+    known = np.zeros(shape, bool)
+    known[16, 3] = True
+    z = np.where(known, 100.0, 0.0)
+    noise = Displacement(100.0, 0.5, 0.0, 1, 5)
+
+    def made(scheme):
+        return interpolate(z, known, displacement=noise, scheme=scheme)
+
+    np.testing.assert_array_equal(made("auto"), made("triangle-edge"))
+    assert not np.array_equal(made("auto"), made("diamond-square"))

@@ -8,7 +8,7 @@ import pytest
 
 from demsmith.core.errors import InputError
 from demsmith.core.mcmd import McmdOptions
-from demsmith.core.options import Specification, option, specifications, validate
+from demsmith.core.options import Specification, option, options_from, specifications, validate
 from demsmith.core.voids import FillOptions
 
 ALL = {spec.name: spec for spec in specifications(FillOptions)}
@@ -112,6 +112,20 @@ def test_unknown_keywords_and_places():
         FillOptions("relaxed")
     with pytest.raises(dataclasses.FrozenInstanceError):
         FillOptions().seed = 3
+
+
+def test_options_whole_or_as_keywords():
+    given = FillOptions(seed=5)
+    assert options_from(FillOptions, given, {}, "fill") is given
+    assert options_from(FillOptions, None, {"seed": 5}, "fill") == given
+    with pytest.raises(InputError, match="^give options or seed, r_s, not both$"):
+        options_from(FillOptions, given, {"seed": 5, "r_s": 1}, "fill")
+    with pytest.raises(InputError, match="^fill got an unexpected keyword argument 'colour'$"):
+        options_from(FillOptions, None, {"colour": "red"}, "fill")
+    with pytest.raises(InputError, match="seed is -1"):
+        options_from(FillOptions, None, {"seed": -1}, "fill")
+    with pytest.raises(InputError, match="seed is -1"):
+        options_from(FillOptions, FillOptions(seed=-1), {}, "fill")
 
 
 def test_options_of_ones_own():

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from demsmith.core.errors import Cancelled, DemsmithError
-from demsmith.core.progress import SILENT, Progress, Span, checkpoint
+from demsmith.core.progress import SILENT, Muted, Progress, Span, checkpoint
 
 
 class Recorder:
@@ -58,3 +58,22 @@ def test_checkpoint():
 def test_cancelled_is_one_of_ours_and_no_failure():
     assert issubclass(Cancelled, DemsmithError)
     assert Cancelled().exit_status == 130
+
+
+def test_muted_hears_cancel_and_reports_nothing():
+    class Watched:
+        told = ()
+        stop = False
+
+        def report(self, fraction):
+            self.told = (*self.told, fraction)
+
+        def cancelled(self):
+            return self.stop
+
+    watched = Watched()
+    checkpoint(Muted(watched), 0.5)
+    assert watched.told == ()
+    watched.stop = True
+    with pytest.raises(Cancelled):
+        checkpoint(Muted(watched), 0.6)

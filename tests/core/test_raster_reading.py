@@ -7,7 +7,7 @@ import pytest
 from support import WGS84_3ARC, hills, make_raster, truncate
 
 from demsmith.core.errors import Cancelled, InputError
-from demsmith.core.raster import read
+from demsmith.core.raster import read, read_grid
 
 gdal = pytest.importorskip("osgeo.gdal", reason="GDAL is missing")
 
@@ -312,3 +312,20 @@ def test_progress_only_grows_and_stays_below_one(tmp_path):
     assert reports == sorted(reports)
     assert reports[0] > 0
     assert reports[-1] <= 1
+
+
+def test_a_grid_is_read_without_the_values(tmp_path):
+    path = make_raster(tmp_path / "dem.tif", hills(200, 300), options=["COMPRESS=DEFLATE"])
+    grid = read(path).grid
+    truncate(path, 0.9)
+    with pytest.raises(InputError, match="cannot be read between"):
+        read(path)
+    assert read_grid(path) == grid
+
+
+def test_grids_that_cannot_be_read(tmp_path):
+    rotated = make_raster(tmp_path / "r.tif", hills(), geotransform=(0, 1, 0.5, 0, 0.5, -1))
+    with pytest.raises(InputError, match="r.tif' cannot be used: it is rotated"):
+        read_grid(rotated)
+    with pytest.raises(InputError, match="does not exist"):
+        read_grid(tmp_path / "none.tif")

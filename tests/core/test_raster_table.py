@@ -36,6 +36,8 @@ def table(tmp_path, text, name="points.csv", encoding="utf-8"):
         "id,Elevation,lat,LON,name\n1,3.5,2.5,1.5,peak\n2,600,-5,4,\n",
         'name,easting,northing,h\n"a, b",1.5,2.5,3.5\nc,4,-5,600\n',
         "x,y,z,height\n1.5,2.5,3.5,9\n4,-5,600,9\n",
+        "id,xcoord,ycoord,elev\n1,1.5,2.5,3.5\n2,4,-5,600\n",
+        "POINT_X,POINT_Y,h\n1.5,2.5,3.5\n4,-5,600\n",
         "1.5,2.5,3.5,extra\n4,-5,600\n",
     ],
 )
@@ -110,8 +112,12 @@ def test_first_row_that_is_bad_is_no_header(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text", ["x,y,z\n", "# nothing\n\n", "1,2\n3,4\n", "once upon a time\n", "x,y,z\n1,1,nan\n"]
-)
+    "text",
+    [
+        "x,y,z\n", "# nothing\n\n", "1,2\n3,4\n", "once upon a time\n", "x,y,z\n1,1,nan\n",
+        "{" + "a" * 200_000 + "}\n", "x,y,z\n1,2,3\n" + '"4' * 200_000,
+    ],
+)  # fmt: skip
 def test_no_points(tmp_path, text):
     with pytest.raises(InputError, match=r"points\.csv"):
         read_table(table(tmp_path, text))

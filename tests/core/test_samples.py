@@ -98,7 +98,7 @@ def test_points_of_one_cell_are_averaged():
     assert only(samples) == ([0, 79], [1, 5], [20.0, 7.0])
     assert (gridded.shared, gridded.deviation) == (1, 20.0)
     (note,) = from_samples(samples, GRID).notes
-    assert note.startswith("1 cells hold several points") and "20 m" in note
+    assert note.startswith("1 cell holds several points") and "20 m" in note
 
 
 def test_edges_belong_to_the_outermost_cells():
@@ -150,6 +150,15 @@ def test_lines_are_cut_at_the_grids_edge():
     assert (rows, columns) == ([39] * 120, list(range(120)))
     np.testing.assert_allclose(z, np.arange(5, 1200, 10), atol=1e-3)
     assert only(Samples(lines=[[(-1e12, 9, 1), (-50, 1e12, 2)]])) == ([], [], [])
+
+
+def test_a_line_across_the_grid_counts_though_its_vertices_lie_outside():
+    across = [(-500, 810, 300), (1700, 830, 300)]
+    beyond = [(-500, 5000, 400), (600, 5200, 400), (1700, 5000, 400)]
+    for kind in ("lines", "contours"):
+        made = from_samples(Samples([(5, 5, 200)], **{kind: [beyond, across]}), GRID)
+        assert (made.samples, made.samples_outside) == (3, 3)
+        assert made.notes == ("3 of 6 samples lie outside the grid; left out",)
 
 
 @pytest.mark.parametrize(
@@ -233,6 +242,17 @@ def test_cells_keep_their_digits(dtype, kept):
     np.testing.assert_array_equal(made.values[~cells.mask], cells.compressed())
 
 
+def test_elevations_are_taken_away():
+    line = [(0, 10, 1), (50, 10, 2), (90, 10, 3)]
+    samples = Samples([(1, 2, 3), (4, 5, 6)], [line], [line[:1]], [[7.0]])
+    left = samples.without(np.array([True, False, False, True, False, True]))
+    np.testing.assert_array_equal(left.points[:, 2], [np.nan, 6])
+    np.testing.assert_array_equal(left.lines[0][:, 2], [1, np.nan, 3])
+    np.testing.assert_array_equal(left.contours[0][:, 2], [np.nan])
+    np.testing.assert_array_equal(left.vertices()[:, :2], samples.vertices()[:, :2])
+    assert left.cells == [[7.0]] and samples.points[0, 2] == 3
+
+
 def test_samples_are_put_together():
     nan = np.nan
     one = Samples([(1, 2, 3)], cells=[[1.0, nan], [nan, nan]])
@@ -296,6 +316,23 @@ def test_an_option_of_ones_own_wins_over_the_preset():
     assert with_preset(options) == options
     with pytest.raises(InputError, match="variant relaxed"):
         from_samples([(5, 5, 5)], GRID, preset="smooth", variant="relaxed")
+
+
+def test_what_is_given_wins_even_if_it_is_the_default():
+    points = [(5, 5, 0), (1195, 1595, 90), (605, 305, 30)]
+    smooth = from_samples(points, GRID, preset="figure-12a", r_s=0).values
+    by_hand = from_samples(points, GRID, variant="paper", l=1.1, l_bu=20).values
+    np.testing.assert_array_equal(smooth, by_hand)
+    rough = from_samples(None, GRID, relief=100.0, h=0.5).values
+    assert not np.array_equal(rough, from_samples(None, GRID, relief=100.0).values)
+    for options in ({"r_s": 0.0}, {"preset": "smooth"}):
+        with pytest.raises(InputError, match="no cell is known"):
+            from_samples(None, GRID, **options)
+
+
+def test_curves_are_refused_by_the_name_of_the_variant():
+    with pytest.raises(InputError, match="'converged' has no such curve"):
+        from_samples([(5, 5, 5), (605, 305, 30)], GRID, l=1.0)
 
 
 def test_the_median_filter_takes_out_single_cells():

@@ -13,7 +13,7 @@ import demsmith
 from demsmith.core import raster
 from demsmith.core.errors import Cancelled, InputError
 from demsmith.core.thinning import thin
-from demsmith.core.thinning.options import DETECTORS
+from demsmith.core.thinning.options import DETECTORS, ThinOptions
 
 every_detector = pytest.mark.parametrize("detector", DETECTORS)
 
@@ -115,6 +115,8 @@ def test_cells_are_kept_by_shape_not_by_unit_or_sign(detector):
         (dict(void=np.ones((3, 9), bool)), "void has shape"),
         (dict(pixel_size=0), "pixel_size"),
         (dict(threads=0), "threads is 0"),
+        (dict(colour="red"), "thin got an unexpected keyword argument 'colour'"),
+        (dict(options=ThinOptions(), share=0.5), "give options or share, not both"),
     ],
 )
 def test_bad_input(parameters, said):

@@ -6,7 +6,7 @@ from scenes import disc, fractal, plane
 
 from demsmith.core.errors import Cancelled, InputError
 from demsmith.core.voids import fill_voids, find_voids
-from demsmith.core.voids._roughness import squares_around, squares_within
+from demsmith.core.voids._roughness import smooth, squares_around, squares_within
 from demsmith.core.voids.roughness import LAGS
 
 
@@ -22,6 +22,15 @@ def structure(z, mask, lag):
     return (np.concatenate([down, along]) ** 2).mean()
 
 
+def bends(z, mask, lag):
+    """Mean squared second difference of the cells within a mask, along rows and columns."""
+    out = []
+    for values, inside in ((z, mask), (z.T, mask.T)):
+        second = values[2 * lag :] - 2 * values[lag:-lag] + values[: -2 * lag]
+        out.append(second[inside[2 * lag :] & inside[lag:-lag] & inside[: -2 * lag]])
+    return (np.concatenate(out) ** 2).mean()
+
+
 def voids_of(shape):
     """Sixteen discs, far enough apart that each has surroundings."""
     void = np.zeros(shape, bool)
@@ -31,16 +40,16 @@ def voids_of(shape):
     return void
 
 
-def test_kernels_measure_the_structure_function():
+def test_kernels_measure_second_differences():
     z = np.random.default_rng(0).normal(size=(40, 50))
-    void = disc(z.shape, (20, 25), 7)
+    void = disc(z.shape, (20, 25), 9)
     voids = find_voids(void)
     lags = np.array(LAGS)
     out = np.empty((1, lags.size))
     squares_within(0, 1, z, voids.labels, voids.runs, voids.first_run, lags, out)
-    assert out[0] == pytest.approx([structure(z, void, lag) for lag in LAGS])
+    assert out[0] == pytest.approx([bends(z, void, lag) for lag in LAGS])
     squares_around(0, 1, z, voids.labels, voids.runs, voids.first_run, lags, out, 100)
-    assert out[0] == pytest.approx([structure(z, ~void, lag) for lag in LAGS])
+    assert out[0] == pytest.approx([bends(z, ~void, lag) for lag in LAGS])
 
 
 def test_surroundings_end_at_the_margin():
@@ -90,11 +99,30 @@ def test_roughness_follows_the_ground_around_each_void():
     assert np.median(amplitude[~left]) == pytest.approx(10 * np.median(amplitude[left]), rel=0.5)
 
 
-def test_smooth_ground_stays_smooth():
-    z = plane((80, 80))
-    void = disc(z.shape, (40, 40), 12)
-    filled = fill_voids(z, void, natural_roughness=True)
-    assert np.abs(filled.values - fill_voids(z, void).values).max() < 0.01 * np.ptp(z)
+@pytest.mark.parametrize("shape", ["plane", "cone", "hill"])
+def test_smooth_ground_stays_smooth(shape):
+    """However steep it is, and however much of it the fill misses."""
+    row, column = np.indices((200, 200)) - 100.0
+    radius = np.hypot(row, column)
+    hill = {"plane": plane(row.shape), "cone": 1000 - 3 * radius}
+    z = hill.get(shape, 1000 * np.exp(-(radius**2) / 3000))
+    void = disc(z.shape, (100, 100), 40)
+    smooth = fill_voids(z, void).values
+    rough = fill_voids(z, void, natural_roughness=True).values
+    assert (rough - smooth).std() < 1
+
+
+def test_steep_ground_is_roughened_all_the_same():
+    """A steep slope is not roughness: its voids are given what level ground would be."""
+    z = rough_ground(relief=100.0)
+    void = voids_of(z.shape)
+
+    def amplitudes(ground):
+        return fill_voids(ground, void, natural_roughness=True).roughness.amplitude
+
+    level, steep = amplitudes(z), amplitudes(z + plane(z.shape, (40.0, 25.0)))
+    assert (level > 0).all()
+    np.testing.assert_allclose(steep, level, rtol=0.1)
 
 
 def test_each_void_depends_on_its_own_surroundings():
@@ -160,3 +188,15 @@ def test_cancel():
     with pytest.raises(Cancelled):
         fill_voids(z, void, natural_roughness=True, progress=Stop())
     assert max(told) < 0.8
+
+
+def test_smoothing_is_a_mean_of_neighbours_within_the_void():
+    from scipy.ndimage import convolve
+
+    void = disc((40, 50), (20, 25), 9) | disc((40, 50), (0, 0), 4)
+    noise = np.where(void, np.random.default_rng(0).normal(size=void.shape), 0.0)
+    kernel = np.outer([1, 6, 1], [1, 6, 1]) / 64
+    expected = np.where(void, convolve(noise, kernel, mode="constant"), 0.0)
+    voids = find_voids(void)
+    smooth(0, len(voids), noise, voids.labels, voids.runs, voids.first_run)
+    np.testing.assert_allclose(noise, expected, atol=1e-15)

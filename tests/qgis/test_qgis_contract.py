@@ -18,7 +18,7 @@ INTERIOR_ONLY    boolean            False          required
 MAX_SIZE         number             -              optional
 FLOAT            boolean            False          required
 VARIANT          enum               relaxed        required advanced
-SCHEME           enum               triangle-edge  required advanced
+SCHEME           enum               auto           required advanced
 L                number             0.0            required advanced
 L_BU             number             0.0            required advanced
 DATUM            number             -              optional advanced

@@ -48,6 +48,10 @@ CONTOURS          multilayer        -             optional
 FIELD             string            -             optional
 SELECTED_ONLY     boolean           False         required advanced
 BAND              number            1             required advanced
+NODATA            string            -             optional advanced
+MASK              raster            -             optional advanced
+BELOW             number            -             optional advanced
+ABOVE             number            -             optional advanced
 LIKE              raster            -             optional
 EXTENT            extent            -             optional
 RESOLUTION        number            -             optional
@@ -60,14 +64,14 @@ PRESET            enum              none          required
 TUNE              boolean           False         required
 FLOAT             boolean           False         required
 VARIANT           enum              converged     required advanced
-SCHEME            enum              triangle-edge required advanced
-L                 number            0.0           required advanced
-L_BU              number            0.0           required advanced
+SCHEME            enum              auto          required advanced
+L                 number            -             optional advanced
+L_BU              number            -             optional advanced
 DATUM             number            -             optional advanced
 TENSION           number            -             optional advanced
-H                 number            0.5           required advanced
-R_S               number            0.0           required advanced
-R_T               number            0.0           required advanced
+H                 number            -             optional advanced
+R_S               number            -             optional advanced
+R_T               number            -             optional advanced
 RELIEF            number            -             optional advanced
 SEED              number            0             required advanced
 STIFFNESS         number            -             optional advanced
@@ -178,6 +182,17 @@ def test_points_beside_a_raster_come_to_its_grid(make, thinned):
     made, _, geotransform, _ = read(make(INPUT=[layer, QgsRasterLayer(thinned[0])])["OUTPUT"])
     assert geotransform == GRID
     assert made[19, 10] == 3000
+
+
+def test_elevations_of_points_that_mean_none(make):
+    places = ((5, 5, 100), (295, 195, 100), (105, 105, -9999))
+    points = [(QgsGeometry(QgsPoint(WEST + x, SOUTH + y, z)), []) for x, y, z in places]
+    layer = make_layer("PointZ", points)
+    assert "1 sample holds the value -9999" in make(INPUT=[layer], RESOLUTION=10)["WARNINGS"]
+    for voids in ({"NODATA": "-9999"}, {"BELOW": -500}):
+        result = make(INPUT=[layer], RESOLUTION=10, **voids)
+        assert result["CELLS_KNOWN"] == 2
+        assert (read(result["OUTPUT"])[0] == 100).all()
 
 
 def test_the_extent_is_brought_to_the_crs_of_the_result(make):
@@ -305,6 +320,7 @@ def test_layers_are_styled_when_loaded(plugin):
         ({"INPUT": "{folder}/none.gpkg", **GROUND}, "INPUT"),
         ({"SKETCH": "{folder}/none.png", **GROUND}, "none.png"),
         ({"INPUT": points_with_z, **GROUND, "R_S": 99}, "R_S"),
+        ({"INPUT": points_with_z, **GROUND, "NODATA": "none"}, "NODATA is 'none'; give numbers"),
         ({"INPUT": points_with_z, **GROUND, "OUTPUT": "{folder}/x.asc"}, "not supported"),
         ({"INPUT": points_with_z, **GROUND, "OUTPUT": "{folder}/no/x.tif"}, "there is no folder"),
         ({"INPUT": points_with_z, "RESOLUTION": 1e-4}, "GB of memory"),
