@@ -39,12 +39,19 @@ def count_cells(runs, a, b):
 
 
 @numba.njit(**_JIT)
-def coarsest_level(runs, a, b):
-    """Give the coarsest level worth relaxing: its step does not exceed the void's extent."""
+def columns_of(runs, a, b):
+    """Give the first column of the runs ``a`` to ``b`` and one past their last."""
     low, high = runs[a, 1], runs[a, 2]
     for k in range(a, b):
         low = min(low, runs[k, 1])
         high = max(high, runs[k, 2])
+    return low, high
+
+
+@numba.njit(**_JIT)
+def coarsest_level(runs, a, b):
+    """Give the coarsest level worth relaxing: its step does not exceed the void's extent."""
+    low, high = columns_of(runs, a, b)
     extent = max(high - low, runs[b - 1, 0] - runs[a, 0] + 1)
     level = 0
     while (2 << level) <= extent:

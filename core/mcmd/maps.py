@@ -41,6 +41,14 @@ class Maps:
     r_s: np.ndarray | None = None
     r_t: np.ndarray | None = None
 
+    def refuse_curves(self, variant):
+        """Raise `InputError` if ``l`` or ``l_bu`` bends, for a variant that has no such curve."""
+        if np.any(self.l) or np.any(self.l_bu):
+            raise InputError(
+                f"l and l_bu bend the variants 'weighted' and 'paper'; '{variant}' has no such "
+                "curve"
+            )
+
     def over(self, options, shape):
         """Lay the maps over the numbers of options.
 

@@ -7,7 +7,12 @@ The only package that meets GDAL, at first use: importing it needs none.
 
 from demsmith.core.raster.features import Features
 from demsmith.core.raster.grid import XY, Grid, PixelSize, Shape
-from demsmith.core.raster.outputs import check_output, check_place, whole_or_nothing
+from demsmith.core.raster.outputs import (
+    all_or_nothing,
+    check_output,
+    check_place,
+    whole_or_nothing,
+)
 from demsmith.core.raster.points import write_points
 from demsmith.core.raster.raster import BandMeta, Raster
 from demsmith.core.raster.reading import read, read_grid
@@ -28,6 +33,7 @@ __all__ = [
     "Raster",
     "Shape",
     "Written",
+    "all_or_nothing",
     "check_output",
     "check_place",
     "read",

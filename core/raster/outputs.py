@@ -105,6 +105,23 @@ def whole_or_nothing(path):
         shutil.rmtree(workshop, ignore_errors=True)
 
 
+@contextlib.contextmanager
+def all_or_nothing(paths):
+    """Yield a `whole_or_nothing` path for each output of several, none of which stays alone.
+
+    Parameters
+    ----------
+    paths : dict
+        Paths by name; ``None`` for an output that is not wanted, and then not yielded.
+    """
+    with contextlib.ExitStack() as outputs:
+        yield {
+            name: outputs.enter_context(whole_or_nothing(path))
+            for name, path in paths.items()
+            if path
+        }
+
+
 def cannot_write(path, reason):
     """Make the `OutputError` of a path, without the folders of unfinished work in it."""
     message = f"cannot write '{path}': {reason}"

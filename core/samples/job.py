@@ -1,6 +1,5 @@
 """Terrain from files of samples to a file, as the command line and QGIS make it."""
 
-import contextlib
 import functools
 import operator
 import os
@@ -208,12 +207,7 @@ def _stored(made, sources, options):
 
 def _write(made, values, like, paths, progress, **how):
     how.update(like=like, overwrite=True)
-    with contextlib.ExitStack() as all_or_nothing:
-        part = {
-            name: all_or_nothing.enter_context(raster.whole_or_nothing(path))
-            for name, path in paths.items()
-            if path
-        }
+    with raster.all_or_nothing(paths) as part:
         raster.write(
             part["output"], values, void=np.zeros(values.shape, bool), dtype=like.meta.dtype,
             progress=Span(progress, 0, 0.8), **how,

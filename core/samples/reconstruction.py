@@ -90,10 +90,7 @@ def _from_noise(known, options, maps, *, lattice, pixel_size, threads, progress)
 
 def _converged(values, known, options, maps, *, lattice, pixel_size, threads, progress):
     by_cell = (maps or Maps()).over(options, known.shape)
-    if np.any(by_cell.l) or np.any(by_cell.l_bu):
-        raise InputError(
-            "l and l_bu bend the variants 'weighted' and 'paper'; 'converged' has no such curve"
-        )
+    by_cell.refuse_curves(options.variant)
     # Noise comes last, or the energy's descent would smooth it away.
     start = fill_voids(
         values, ~known, options=_fill_options(options, variant="relaxed", r_s=0.0),

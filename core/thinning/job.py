@@ -1,6 +1,5 @@
 """Thinning from file to file, as the command line and QGIS do it."""
 
-import contextlib
 import os
 import time
 from dataclasses import dataclass, fields
@@ -104,15 +103,13 @@ def thin_file(
     if points:
         check_points_output(points, crs=source.grid.crs, **checks)
     thinned = _thin(source, options, threads, Span(progress, 0.15, 0.7))
-    with contextlib.ExitStack() as all_or_nothing:
-        part = all_or_nothing.enter_context(raster.whole_or_nothing(output))
+    with raster.all_or_nothing({"output": output, "points": points}) as part:
         raster.write(
-            part, source.values, void=~thinned.kept, like=source, threads=threads,
+            part["output"], source.values, void=~thinned.kept, like=source, threads=threads,
             creation_options=creation_options, progress=Span(progress, 0.7, 0.85),
         )  # fmt: skip
         if points:
-            part = all_or_nothing.enter_context(raster.whole_or_nothing(points))
-            _write_points(part, source, thinned.kept, Span(progress, 0.85, 1))
+            _write_points(part["points"], source, thinned.kept, Span(progress, 0.85, 1))
         checkpoint(progress, 1.0)
     return ThinResult(
         output=os.fspath(output),

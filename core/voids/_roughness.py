@@ -3,6 +3,8 @@
 import numba
 import numpy as np
 
+from demsmith.core.mcmd._points import columns_of
+
 _JIT = dict(nogil=True, cache=True, error_model="numpy")
 
 
@@ -23,9 +25,7 @@ def squares_around(begin, end, values, labels, runs, first_run, lags, out, margi
     height, width = labels.shape
     for void in range(begin, end):
         a, b = first_run[void], first_run[void + 1]
-        left, right = runs[a, 1], runs[a, 2]
-        for k in range(a, b):
-            left, right = min(left, runs[k, 1]), max(right, runs[k, 2])
+        left, right = columns_of(runs, a, b)
         top, bottom = max(runs[a, 0] - margin, 0), min(runs[b - 1, 0] + 1 + margin, height)
         left, right = max(left - margin, 0), min(right + margin, width)
         for n in range(lags.size):
@@ -107,9 +107,7 @@ def smooth(begin, end, noise, labels, runs, first_run):
     """Smooth the noise of each void by 1-6-1 along rows and columns, as if nought all around."""
     for void in range(begin, end):
         a, b = first_run[void], first_run[void + 1]
-        left, right = runs[a, 1], runs[a, 2]
-        for k in range(a, b):
-            left, right = min(left, runs[k, 1]), max(right, runs[k, 2])
+        left, right = columns_of(runs, a, b)
         top = runs[a, 0] - 1
         # The void and a cell around it, smoothed along rows.
         along = np.zeros((runs[b - 1, 0] - top + 2, right - left + 2))

@@ -181,10 +181,8 @@ def fill_voids(
 
 
 def _refuse_contradictions(options, by_cell):
-    if options.variant == "relaxed" and (np.any(by_cell.l) or np.any(by_cell.l_bu)):
-        raise InputError(
-            "l and l_bu bend the variants 'weighted' and 'paper'; 'relaxed' has no such curve"
-        )
+    if options.variant == "relaxed":
+        by_cell.refuse_curves(options.variant)
     if options.natural_roughness and np.any(by_cell.r_s):
         raise InputError(
             "natural_roughness finds the displacements that r_s would set; give one of them"

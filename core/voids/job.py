@@ -1,6 +1,5 @@
 """Void filling from file to file, as the command line and QGIS do it."""
 
-import contextlib
 import json
 import os
 import time
@@ -126,12 +125,7 @@ def fill_file(
     left = filled.left()
     checkpoint(progress, 0.8)
     writing = dict(like=source, threads=threads, overwrite=True, creation_options=creation_options)
-    with contextlib.ExitStack() as all_or_nothing:
-        part = {
-            name: all_or_nothing.enter_context(raster.whole_or_nothing(path))
-            for name, path in paths.items()
-            if path
-        }
+    with raster.all_or_nothing(paths) as part:
         raster.write(
             part["output"], filled.values, void=left, dtype=filled.values.dtype,
             progress=Span(progress, 0.8, 0.95), **writing,

@@ -92,8 +92,9 @@ def roughen(values, voids, selected, *, seed=0, offsets=(0, 0), threads=None, pr
     # Noise is made anew rather than kept: memory for one field, not for each kind.
     for n, part in enumerate(_parts(progress, 0.7, 1)):
         chosen = np.flatnonzero((best == n) & (amplitude > 0))
-        noise = work.displaced(chosen, _KINDS[n], seed, part)
-        work.add(values, noise, np.where(best == n, amplitude, 0.0))
+        if chosen.size:
+            noise = work.displaced(chosen, _KINDS[n], seed, part)
+            work.add(values, noise, np.where(best == n, amplitude, 0.0))
     return Roughness(np.array([h for h, _ in _KINDS])[best], amplitude)
 
 
