@@ -47,10 +47,12 @@ lint: $(VENV)/test.stamp ## style and the direction of imports
 	@$(PY) -m flake8
 	@$(VENV)/bin/lint-imports --no-logo --no-cache
 
-bench: $(VENV)/test.stamp ## measure against GDAL and SciPy in the same run: filling, samples, tuning
+bench: $(VENV)/test.stamp ## measure against the peers in the same run: filling, samples, tuning, reconstruction
 	@$(PY) benchmarks/fill.py
 	@$(PY) benchmarks/mcmd.py
 	@$(PY) benchmarks/tuning.py
+	@$(PY) benchmarks/voids.py
+	@$(PY) benchmarks/voids_auxiliary.py
 
 zip: ## the plugin as QGIS installs it, from the last commit (REVISION=… for another)
 	@mkdir -p "$(DIST)"

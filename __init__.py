@@ -19,6 +19,11 @@ _PUBLIC = {
     "samples_file": "demsmith.core.samples",
     "thin": "demsmith.core.thinning",
     "thin_file": "demsmith.core.thinning",
+    "reconstruct": "demsmith.core.reconstruction",
+    "reconstruct_file": "demsmith.core.reconstruction",
+    "reconstruct_mosaic": "demsmith.core.mosaic",
+    "validate": "demsmith.core.validation",
+    "validate_file": "demsmith.core.validation",
 }
 
 __all__ = ["__version__", *_PUBLIC]

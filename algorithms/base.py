@@ -4,8 +4,10 @@ import configparser
 import os
 
 from qgis.core import (
+    QgsProcessing,
     QgsProcessingAlgorithm,
     QgsProcessingException,
+    QgsProcessingUtils,
     QgsProviderRegistry,
 )
 from qgis.PyQt.QtCore import QUrl
@@ -53,7 +55,7 @@ class Tool(QgsProcessingAlgorithm):
         """Check what QGIS checks, then that outputs are of a kind that can be written."""
         fine, message = super().checkParameterValues(parameters, context)
         if not fine:
-            return False, _why_unreadable(self, parameters) or message
+            return False, _why_unreadable(self, parameters, context) or message
         for output in self.destinationParameterDefinitions():
             value = parameters.get(output.name())
             if value:
@@ -148,20 +150,36 @@ def file_of(layer, name):
     return _without_additions(layer.source())
 
 
-def _why_unreadable(tool, parameters):
-    """Say what is wrong with a raster file; QGIS calls every one it cannot load "not found"."""
+def _why_unreadable(tool, parameters, context):
+    """Say which raster cannot be loaded and why; QGIS says that it is not found, or not even that.
+
+    Gives an empty text if all can.
+    """
     from demsmith.core.errors import InputError
     from demsmith.core.raster.opening import opened
 
     for parameter in tool.parameterDefinitions():
-        path = parameters.get(parameter.name())
-        if parameter.type() == "raster" and isinstance(path, str) and os.path.exists(path):
+        for value in _rasters_given(parameter, parameters):
+            if QgsProcessingUtils.mapLayerFromString(value, context):
+                continue
             try:
-                with opened(path):
+                with opened(value):
                     continue
             except InputError as error:
                 return f"{parameter.name()}: {error}"
     return ""
+
+
+def _rasters_given(parameter, parameters):
+    """List the values of a parameter for one raster or several that name a layer or a file."""
+    several = parameter.type() == "multilayer"
+    if not several and parameter.type() != "raster":
+        return []
+    if several and parameter.layerType() != QgsProcessing.SourceType.TypeRaster:
+        return []
+    value = parameters.get(parameter.name())
+    values = value if isinstance(value, (list, tuple)) else [value]
+    return [each for each in values if isinstance(each, str)]
 
 
 def _without_additions(source):

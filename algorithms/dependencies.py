@@ -14,9 +14,9 @@ from qgis.PyQt.QtCore import QCoreApplication
 
 OLDEST_PYTHON = (3, 11)
 OLDEST_NUMPY = "1.26"
-REQUIREMENTS = ("numpy>=" + OLDEST_NUMPY, "numba>=0.59", "geographiclib>=2.0")
-# What some tools need: thinning and sketches, tuning, images. Without them the others still work.
-EXTRAS = ("scipy>=1.11", "nlopt>=2.7", "openimageio>=3.0")
+REQUIREMENTS = ("numpy>=" + OLDEST_NUMPY, "numba>=0.59", "geographiclib>=2.0", "scipy>=1.11")
+# What some tools need: tuning, images, validation. Without them the others still work.
+EXTRAS = ("nlopt>=2.7", "openimageio>=3.0", "scikit-image>=0.22")
 
 
 def _tr(text):

@@ -30,11 +30,14 @@ your data mark voids otherwise. The layer's <i>additional no data values</i> in 
 looked at: give them here.</p>
 <p><b>What is filled.</b> Every void, also those at the edge, unless you restrict it to interior
 voids or to a size. The result has the type of the input, rounded, or 32-bit floating point.</p>
-<p><b>Method.</b> Constrained midpoint displacement (F. Belhadj, <i>Terrain modeling: a
-constrained fractal model</i>, 2007) with every generation relaxed to the smoothest surface
-through the known ground. Strength <i>r_s</i> above 0 adds roughness, everywhere alike or, by
+<p><b>Method.</b> <i>auto</i> learns from the raster's own ground how it bends and how rough it is,
+tries its estimators in artificial voids, and fills each void by the blend that does best at its
+size; it also tells how wrong each cell may be. <i>mcmd</i> is faster: constrained midpoint
+displacement (F. Belhadj, <i>Terrain modeling: a constrained fractal model</i>, 2007) with every
+generation relaxed to the smoothest surface through the known ground; auto hands over to it when one
+of its own options is set. Strength <i>r_s</i> above 0 adds roughness, everywhere alike or, by
 maps of the parameters, from cell to cell.</p>
-<p><b>Besides.</b> The source map tells filled cells (1) from original ones (0) and
+<p><b>Besides.</b> The source map tells by what each cell was filled, original cells (0) and
 voids left as they were (2). The report is
 a JSON file with the place, size and rim of every void.</p>
 """
@@ -97,7 +100,12 @@ class FillVoids(BandTool):
             help_text="GeoTIFF with the voids filled.")  # fmt: skip
         add(self, QgsProcessingParameterRasterDestination(
                 "SOURCE_MAP", tr("Source map"), optional=True, createByDefault=False),
-            help_text="GeoTIFF of 0 original, 1 filled, 2 a void left as it was.")  # fmt: skip
+            help_text="GeoTIFF of 0 original, 2 a void left as it was, others by what the cell was "
+            "filled.")  # fmt: skip
+        add(self, QgsProcessingParameterRasterDestination(
+                "UNCERTAINTY", tr("Uncertainty"), optional=True, createByDefault=False),
+            help_text="GeoTIFF of the standard error to be expected in filled cells, 0 in known "
+            "ones. Method auto only.")  # fmt: skip
         add(self, QgsProcessingParameterFileDestination(
                 "REPORT", tr("Report"), tr("JSON files (*.json)"),
                 optional=True, createByDefault=False),
@@ -118,6 +126,7 @@ class FillVoids(BandTool):
 
         output = self.parameterAsOutputLayer(parameters, "OUTPUT", context)
         source_map = self.parameterAsOutputLayer(parameters, "SOURCE_MAP", context)
+        uncertainty = self.parameterAsOutputLayer(parameters, "UNCERTAINTY", context)
         report = self.parameterAsFileOutput(parameters, "REPORT", context)
         result = fill_file(
             **self.read_source(parameters, context),
@@ -125,10 +134,13 @@ class FillVoids(BandTool):
             options=read_options(self, FillOptions, parameters, context),
             maps=self._maps,
             source_map=source_map or None,
+            uncertainty=uncertainty or None,
             report=report or None,
             **self.read_running(parameters, context),
             progress=progress,
         )
+        for reason in result.reasons:
+            feedback.pushInfo(reason)
         for warning in result.warnings:
             feedback.pushWarning(warning)
         feedback.pushInfo(
@@ -144,6 +156,9 @@ class FillVoids(BandTool):
         if source_map:
             outputs["SOURCE_MAP"] = source_map
             styling.style_source_map(source_map, context)
+        if uncertainty:
+            outputs["UNCERTAINTY"] = uncertainty
+            styling.style_uncertainty(uncertainty, context)
         if report:
             outputs["REPORT"] = report
         return outputs

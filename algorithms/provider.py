@@ -58,8 +58,14 @@ class DemsmithProvider(QgsProcessingProvider):
             return
         from demsmith.algorithms.fillvoids import FillVoids
         from demsmith.algorithms.reconstructfromsamples import ReconstructFromSamples
+        from demsmith.algorithms.reconstructmosaic import ReconstructMosaic
+        from demsmith.algorithms.reconstructsrtm import ReconstructSrtm
         from demsmith.algorithms.thinraster import ThinRaster
+        from demsmith.algorithms.validatefill import ValidateFill
 
         self.addAlgorithm(FillVoids())
         self.addAlgorithm(ReconstructFromSamples())
+        self.addAlgorithm(ReconstructMosaic())
+        self.addAlgorithm(ReconstructSrtm())
         self.addAlgorithm(ThinRaster())
+        self.addAlgorithm(ValidateFill())

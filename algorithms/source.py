@@ -1,4 +1,4 @@
-"""What tools share that work on one band of a raster: which raster, band and cells are read."""
+"""What tools share that read elevations: which raster, band and cells are read."""
 
 from qgis.core import (
     QgsProcessingException,
@@ -11,19 +11,21 @@ from demsmith.algorithms.base import Tool
 from demsmith.algorithms.parameters import add, number, read_number, tr
 
 
-class VoidTool(Tool):
-    """A tool that is told by `add_voids` which of the elevations it reads are none."""
+class CellTool(Tool):
+    """A tool that is told by `add_cells` which of the elevations it reads are none."""
 
-    def add_voids(self, *, advanced=False):
-        """Declare what means void, folded away if ``advanced``."""
+    def add_cells(self):
+        """Declare which values mean void."""
+        self._add_nodata()
+        self._add_limits()
+
+    def _add_nodata(self, *, advanced=False):
         add(self, QgsProcessingParameterString(
                 "NODATA", tr("More values that mean void"), optional=True), advanced=advanced,
             help_text="Numbers, separated by commas: what has these values is void, besides "
             "a band's nodata value.")  # fmt: skip
-        add(self, QgsProcessingParameterRasterLayer(
-                "MASK", tr("Mask of voids"), optional=True), advanced=advanced,
-            help_text="Raster of the same size: cells that are neither 0 nor nodata are voids.",
-            )  # fmt: skip
+
+    def _add_limits(self):
         add(self, number("BELOW", "Void at or below", optional=True), advanced=True,
             help_text="What has this value or a lower one is void.")  # fmt: skip
         add(self, number("ABOVE", "Void at or above", optional=True), advanced=True,
@@ -50,15 +52,14 @@ class VoidTool(Tool):
 
     def look_up(self, parameters, context):
         """Find the layers that were given, and keep for the run what names them."""
-        self._mask = self.raster_source(parameters, "MASK", context)
+        raise NotImplementedError
 
-    def read_voids(self, parameters, context):
-        """Give the arguments of the core's file functions that say what means void."""
+    def read_cells(self, parameters, context):
+        """Give the arguments of the core's file functions that say which values mean void."""
         return dict(
             nodata=self._void_values(parameters, context),
             below=read_number(self, "BELOW", parameters, context),
             above=read_number(self, "ABOVE", parameters, context),
-            mask=self._mask,
         )
 
     def _void_values(self, parameters, context):
@@ -71,6 +72,27 @@ class VoidTool(Tool):
                     text
                 )
             ) from None
+
+
+class VoidTool(CellTool):
+    """A tool that takes a mask of voids, too: it is told by `add_voids`."""
+
+    def add_voids(self, *, advanced=False):
+        """Declare what means void, folded away if ``advanced``."""
+        self._add_nodata(advanced=advanced)
+        add(self, QgsProcessingParameterRasterLayer(
+                "MASK", tr("Mask of voids"), optional=True), advanced=advanced,
+            help_text="Raster of the same size: cells that are neither 0 nor nodata are voids.",
+            )  # fmt: skip
+        self._add_limits()
+
+    def look_up(self, parameters, context):
+        """Find the layers that were given, and keep for the run what names them."""
+        self._mask = self.raster_source(parameters, "MASK", context)
+
+    def read_voids(self, parameters, context):
+        """Give the arguments of the core's file functions that say what means void."""
+        return dict(mask=self._mask, **self.read_cells(parameters, context))
 
 
 class BandTool(VoidTool):

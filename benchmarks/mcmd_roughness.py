@@ -8,8 +8,8 @@ from results import table
 from scipy.ndimage import binary_dilation, find_objects
 
 import demsmith
+from demsmith.core.validation import punch_voids
 from demsmith.core.voids import find_voids
-from demsmith.core.voids.validation import punch_voids
 
 SEEDS = (0, 1, 2)
 LAGS = (1, 2, 4, 8)
@@ -61,7 +61,7 @@ class Punched:
         """Give the filled surfaces by label, and the truth, as float64."""
         made = {
             label: demsmith.fill_voids(
-                self.truth, self.void, pixel_size=self.sizes, threads=2, **options
+                self.truth, self.void, method="mcmd", pixel_size=self.sizes, threads=2, **options
             ).values
             for label, options in ways.items()
         }

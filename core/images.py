@@ -1,15 +1,17 @@
-"""Pictures as numbers: the luminance and alpha of an image of any kind, by OpenImageIO."""
+"""Pictures and numbers: reading an image of any kind, encoding a JPEG, by OpenImageIO."""
 
 import os
+import tempfile
 
 import numpy as np
 
-from demsmith.core.errors import DependencyError, InputError
+from demsmith.core.errors import DependencyError, InputError, OutputError
 
 REC_709 = (0.2126, 0.7152, 0.0722)
 """Shares of red, green and blue in luminance (ITU-R BT.709-6, section 3)."""
 
 _MOST_PIXELS = 1 << 31
+_JPEG_QUALITY = 88
 
 
 def read_image(path):
@@ -53,6 +55,43 @@ def read_image(path):
     if alpha is not None and not spec.get_int_attribute("oiio:UnassociatedAlpha"):
         luminance = np.divide(luminance, alpha, out=np.zeros_like(luminance), where=alpha > 0)
     return np.ascontiguousarray(luminance), alpha
+
+
+def encode_jpeg(picture):
+    """Encode a picture as a JPEG whose colours are as sharp as its brightness.
+
+    Parameters
+    ----------
+    picture : (H, W, 3) uint8 array
+        Red, green and blue.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    OutputError
+        If there is no room for it in the folder of temporary files.
+    DependencyError
+        If OpenImageIO is missing.
+    """
+    oiio = _load()
+    rows, columns, channels = picture.shape
+    spec = oiio.ImageSpec(columns, rows, channels, "uint8")
+    spec.attribute("Compression", f"jpeg:{_JPEG_QUALITY}")
+    spec.attribute("jpeg:subsampling", "4:4:4")
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "picture.jpg")
+            image = oiio.ImageOutput.create(path)
+            done = image.open(path, spec) and image.write_image(np.ascontiguousarray(picture))
+            if not (image.close() and done):
+                raise OSError(_reason(image))
+            with open(path, "rb") as file:
+                return file.read()
+    except OSError as error:
+        raise OutputError(f"cannot write a picture among the temporary files: {error}") from None
 
 
 def _load():

@@ -58,6 +58,12 @@ def option(kind, default, title, help_text, **limits):
     )
 
 
+def same_option(options_class, name):
+    """Make a dataclass field that is the same option as another class has."""
+    (field,) = (field for field in dataclasses.fields(options_class) if field.name == name)
+    return dataclasses.field(default=field.default, metadata=field.metadata)
+
+
 def specifications(options_class):
     """List the `Specification` of every field of an options class, in order."""
     return [

@@ -15,7 +15,7 @@ import qgis_process
 
 import demsmith
 from demsmith.core.errors import DemsmithError, InputError
-from demsmith.core.voids.validation import errors_by_size, punch_voids
+from demsmith.core.validation import errors_by_size, punch_voids
 
 OUT = Path("out")
 SEED = 2007

@@ -19,7 +19,7 @@ from picture import relief  # noqa: E402, demo/picture.py
 
 import demsmith  # noqa: E402
 from demsmith.core.samples.presets import PRESETS  # noqa: E402
-from demsmith.core.voids.validation import punch_voids  # noqa: E402
+from demsmith.core.validation import punch_voids  # noqa: E402
 
 FOLDER = Path(__file__).resolve().with_name("images")
 DPI = 100

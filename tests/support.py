@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import demsmith
+
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 WGS84_3ARC = (10.0, 1 / 1200, 0.0, 50.0, 0.0, -1 / 1200)
@@ -30,6 +32,11 @@ def shared_data(name):
     if not path.exists():
         pytest.skip(f"real data '{name}' is not beside the checkout")
     return str(path)
+
+
+def fill_by_mcmd(values, void=None, **options):
+    """`demsmith.fill_voids` by MCMD alone."""
+    return demsmith.fill_voids(values, void, method="mcmd", **options)
 
 
 def hills(rows=60, columns=80, *, dtype=np.int16, seed=1):

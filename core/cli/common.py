@@ -32,6 +32,19 @@ InputFile = Annotated[
 OutputFile = Annotated[str, Parameter(name="OUTPUT", help="GeoTIFF to write, .tif.")]
 
 
+Auxiliaries = Annotated[
+    tuple[str, ...],
+    Parameter(
+        name="--aux",
+        group=VERB,
+        negative=(),
+        show_default=False,
+        help="Raster, or folder of tiles, of any CRS and resolution to fill from where it does "
+        "better; repeat for more, in the order of trust.",
+    ),
+]
+
+
 def _numbers(_, tokens):
     """Read the numbers, separated by commas, of every time the option is given."""
     return tuple(_number(word) for token in tokens for word in token.value.split(","))
@@ -46,7 +59,7 @@ def _number(word):
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class Source:
+class Cells:
     """Which band is read, and which of its cells are voids besides those the file marks.
 
     The fields are named as the parameters of `demsmith.core.raster.read`.
@@ -73,6 +86,13 @@ class Source:
         float | None,
         Parameter(group=SOURCE, help="Cells at or above this elevation are voids."),
     ] = None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Source(Cells):
+    """The same of one raster, which can have a mask."""
+
     mask: Annotated[
         str | None,
         Parameter(group=SOURCE, help="Raster of the same size; where it is not 0 are voids."),

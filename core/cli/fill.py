@@ -34,7 +34,15 @@ def fill(
     source_map: Annotated[
         str | None,
         Parameter(
-            group=VERB, help="GeoTIFF to write: 0 original, 1 filled, 2 void left as it was."
+            group=VERB,
+            help="GeoTIFF to write: 0 original, 2 void left, others by what a cell was filled.",
+        ),
+    ] = None,
+    uncertainty: Annotated[
+        str | None,
+        Parameter(
+            group=VERB,
+            help="GeoTIFF to write: standard error to expect in filled cells, 0 in known ones.",
         ),
     ] = None,
     report: Annotated[
@@ -47,8 +55,9 @@ def fill(
     """Fill the voids of a raster file."""
     with run.progress("filling voids") as progress:
         result = fill_file(
-            input, output, options=options, maps=maps.paths(), source_map=source_map, report=report,
-            band=source.band, nodata=source.nodata, below=source.below, above=source.above,
+            input, output, options=options, maps=maps.paths(), source_map=source_map,
+            uncertainty=uncertainty, report=report, band=source.band, nodata=source.nodata,
+            below=source.below, above=source.above,
             mask=source.mask, threads=run.threads, overwrite=run.overwrite,
             creation_options=run.creation_option, progress=progress,
         )  # fmt: skip

@@ -62,11 +62,16 @@ def _annotation(spec, group):
         Parameter(
             name=flag(spec),
             group=group,
-            negative=(),
+            negative=_negative(spec),
             show_default=spec.kind is not bool and spec.default is not None,
             help=_help(spec),
         ),
     ]
+
+
+def _negative(spec):
+    """Give the word that turns off what is on by default."""
+    return "--no-" + flag(spec)[2:] if spec.kind is bool and spec.default else ()
 
 
 def _help(spec):

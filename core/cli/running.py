@@ -12,8 +12,11 @@ from demsmith.core.errors import Cancelled, DemsmithError
 
 _VERBS = {
     "fill": "Fill the voids (holes without data) of an elevation raster.",
+    "reconstruct": "Reconstruct the voids of SRTM and its like, with an error for every cell.",
+    "mosaic": "Reconstruct a folder, list or VRT of tiles as one, seam-free.",
     "samples": "Make terrain from points, lines, contours, a sketch, or noise alone.",
     "thin": "Keep only the cells that carry the shape, or a random share.",
+    "validate": "Tell how wrong fills are, by artificial voids like the real ones.",
 }
 
 

@@ -86,6 +86,28 @@ def crs_units(crs):
         )
 
 
+def same_crs(crs, other):
+    """Tell whether two CRS place cells alike, whatever they say of heights.
+
+    Parameters
+    ----------
+    crs, other : str
+        As in `crs_units`; empty if unknown.
+
+    Examples
+    --------
+    >>> same_crs("EPSG:32631", "EPSG:32631"), same_crs("EPSG:32631", "")
+    (True, False)
+    """
+    if crs == other or not (crs and other):
+        return crs == other
+    with session() as heard:
+        references = spatial_reference(crs, heard), spatial_reference(other, heard)
+        for reference in references:
+            reference.StripVertical()
+        return bool(references[0].IsSame(references[1], ["CRITERION=EQUIVALENT"]))
+
+
 def reproject(xy, source, target, *, progress=SILENT):
     """Bring places from one CRS to another.
 

@@ -132,6 +132,38 @@ class Grid:
         x_corner, width, _, y_corner, _, height = self.geotransform
         return XY(x_corner + (column + 0.5) * width, y_corner + (row + 0.5) * height)
 
+    def part(self, rows, columns):
+        """Give the grid of a window of this one.
+
+        Parameters
+        ----------
+        rows, columns : slice
+
+        Raises
+        ------
+        InputError
+            If the window is empty or reaches beyond the grid.
+
+        Examples
+        --------
+        >>> grid = Grid((9, 9), (500.0, 10.0, 0.0, 900.0, 0.0, -10.0))
+        >>> grid.part(slice(2, 4), slice(1, 9)).xy(0, 0) == grid.xy(2, 1)
+        True
+        """
+        inside = 0 <= rows.start < rows.stop <= self.shape.rows
+        if not (inside and 0 <= columns.start < columns.stop <= self.shape.columns):
+            raise InputError(
+                f"rows {rows.start} to {rows.stop} and columns {columns.start} to {columns.stop} "
+                f"are no part of {self.shape.rows} × {self.shape.columns} cells"
+            )
+        shape = Shape(rows.stop - rows.start, columns.stop - columns.start)
+        if not self.georeferenced:
+            return Grid(shape, self.geotransform, self.crs)
+        x, width, row_shear, y, column_shear, height = self.geotransform
+        corner = x + columns.start * width, y + rows.start * height
+        geotransform = (corner[0], width, row_shear, corner[1], column_shear, height)
+        return Grid(shape, geotransform, self.crs)
+
     def row_edges(self):
         """Return the y coordinates of the ``rows + 1`` edges of the rows, from the first row on."""
         _, _, _, y_corner, _, height = self.geotransform

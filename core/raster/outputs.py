@@ -92,17 +92,37 @@ def whole_or_nothing(path):
         raise cannot_write(path, error.strerror) from None
     try:
         yield os.path.join(workshop, name)
-        made = sorted(os.listdir(workshop), key=lambda other: other == name)  # the raster last
-        try:
-            for other in made:
-                os.replace(os.path.join(workshop, other), os.path.join(folder, other))
-            for suffix in _SIDECARS:
-                if name + suffix not in made:
-                    _remove(os.path.join(folder, name + suffix))
-        except OSError as error:
-            raise cannot_write(path, error.strerror) from None
+        settle(workshop, [path])
     finally:
         shutil.rmtree(workshop, ignore_errors=True)
+
+
+def settle(workshop, paths):
+    """Move finished files, and what was written along with them, to where they belong.
+
+    Parameters
+    ----------
+    workshop : str
+        Folder on the same disk that holds them under their final base names.
+    paths : list of str
+        Where they belong, all in one folder.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written to.
+    """
+    folder = os.path.dirname(os.path.abspath(paths[0]))
+    names = [os.path.basename(path) for path in paths]
+    made = sorted(os.listdir(workshop), key=lambda other: other in names)  # the sidecars first
+    try:
+        for other in made:
+            os.replace(os.path.join(workshop, other), os.path.join(folder, other))
+        for sidecar in (name + suffix for name in names for suffix in _SIDECARS):
+            if sidecar not in made:
+                _remove(os.path.join(folder, sidecar))
+    except OSError as error:
+        raise cannot_write(paths[0], error.strerror) from None
 
 
 @contextlib.contextmanager

@@ -8,7 +8,7 @@ from demsmith.core.errors import InputError
 from demsmith.core.progress import SILENT, checkpoint
 from demsmith.core.raster._gdal import load, numpy_type
 from demsmith.core.raster.crs import crs_units
-from demsmith.core.raster.grid import NO_GEOTRANSFORM, Grid, check_same_grid
+from demsmith.core.raster.grid import NO_GEOTRANSFORM, Grid, Shape, check_same_grid
 from demsmith.core.raster.nodata import VoidFinder, metres_per_unit
 from demsmith.core.raster.opening import choose_band, opened
 from demsmith.core.raster.raster import BandMeta, Raster
@@ -18,8 +18,10 @@ _MASK_TOLERANCE = 0.51  # pixels: programs disagree on whether a coordinate is a
 _EXACT_INTEGERS = 1 << 53  # every integer up to here is a float64
 
 
-def read(path, *, band=1, nodata=(), below=None, above=None, mask=None, progress=SILENT):
-    """Read one band of anything GDAL opens.
+def read(
+    path, *, band=1, nodata=(), below=None, above=None, mask=None, window=None, progress=SILENT
+):
+    """Read one band of anything GDAL opens, or a part of it.
 
     Voids are the cells that the file marks by its nodata tag, mask or alpha band; NaN and
     infinite ones; those named by the options; and those that hold -32768 or -32767 in signed
@@ -38,6 +40,8 @@ def read(path, *, band=1, nodata=(), below=None, above=None, mask=None, progress
         ``above``, are voids.
     mask : str or path-like
         Raster of the same size whose non-zero cells are voids here.
+    window : (slice, slice), optional
+        Rows and columns to read. Default: all.
     progress : Progress
         Told how much has been read.
 
@@ -49,13 +53,13 @@ def read(path, *, band=1, nodata=(), below=None, above=None, mask=None, progress
     Raises
     ------
     InputError
-        If the file is missing, damaged, truncated, rotated or complex, has no such band, or
-        the mask does not fit.
+        If the file is missing, damaged, truncated, rotated or complex, has no such band or
+        window, or the mask does not fit.
     """
     path = os.fspath(path)
     rules = dict(nodata=nodata, below=below, above=above)
     with opened(path) as (heard, holder):
-        return _read_band(path, holder[0], band, heard, progress, rules, mask)
+        return _read_band(path, holder[0], band, heard, progress, rules, mask, window)
 
 
 def read_grid(path):
@@ -75,20 +79,45 @@ def read_grid(path):
     InputError
         If the file is missing, damaged, rotated or holds no band.
     """
+    return read_header(path)[0]
+
+
+def read_header(path, *, band=1):
+    """Read what a file says of one of its bands, and nothing of what that holds.
+
+    Parameters
+    ----------
+    path, band
+        As in `read`.
+
+    Returns
+    -------
+    grid : Grid
+    meta : BandMeta
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged, rotated or complex, or has no such band.
+    """
     path = os.fspath(path)
     with opened(path) as (_, holder):
-        choose_band(holder[0], 1, path)
+        chosen = choose_band(holder[0], band, path)
+        meta, _ = _band_meta(holder[0], chosen, path)
         grid, _, _ = _grid(holder[0], path)
-        return grid
+        del chosen  # it must not outlive its dataset
+        return grid, meta
 
 
-def _read_band(path, dataset, number, heard, progress, rules, mask):
+def _read_band(path, dataset, number, heard, progress, rules, mask, window):
     band = choose_band(dataset, number, path)
     meta, notes = _band_meta(dataset, band, path)
-    grid, units, grid_notes = _grid(dataset, path)
-    values, void = _read_values(path, band, meta, grid.shape, heard, progress)
+    whole, units, grid_notes = _grid(dataset, path)
+    rows, columns = window or (slice(0, whole.shape.rows), slice(0, whole.shape.columns))
+    grid = whole.part(rows, columns)
+    values, void = _read_values(path, band, meta, rows, columns, heard, progress)
     if mask is not None:
-        void |= _masked(os.fspath(mask), grid, path)
+        void |= _masked(os.fspath(mask), whole, path)[rows, columns]
     finder = VoidFinder(
         meta,
         **rules,
@@ -114,9 +143,10 @@ def _masked(path, grid, source):
     return (mask.values != 0) & ~mask.void
 
 
-def _read_values(path, band, meta, shape, heard, progress):
-    """Read values and file-made mask, a strip of whole blocks at a time."""
+def _read_values(path, band, meta, rows, columns, heard, progress):
+    """Read a window's values and file-made mask, a strip of whole blocks at a time."""
     gdal = load().gdal
+    shape = Shape(rows.stop - rows.start, columns.stop - columns.start)
     try:
         values = np.empty(shape, dtype=meta.dtype)
         void = np.zeros(shape, dtype=bool)
@@ -130,30 +160,27 @@ def _read_values(path, band, meta, shape, heard, progress):
     mask_band = band.GetMaskBand() if masked else None
     step = _rows_per_block(band, shape)
     for start in range(0, shape.rows, step):
-        rows = slice(start, min(start + step, shape.rows))
-        _read_rows(path, band, rows, values, heard)
+        strip = slice(start, min(start + step, shape.rows))
+        _read_strip(path, band, rows.start + start, columns.start, values[strip], heard)
         if mask_band is not None:
-            valid = np.empty(void[rows].shape, dtype=np.uint8)
-            _read_rows(path, mask_band, rows, valid, heard, into=0)
-            np.equal(valid, 0, out=void[rows])
-        checkpoint(progress, 0.8 * rows.stop / shape.rows)
+            valid = np.empty(void[strip].shape, dtype=np.uint8)
+            _read_strip(path, mask_band, rows.start + start, columns.start, valid, heard)
+            np.equal(valid, 0, out=void[strip])
+        checkpoint(progress, 0.8 * strip.stop / shape.rows)
     return values, void
 
 
-def _read_rows(path, band, rows, target, heard, into=None):
-    """Read a strip of a band into the same rows of ``target``, or from its row ``into`` on."""
+def _read_strip(path, band, row, column, target, heard):
+    """Read the cells of a band from ``row`` and ``column`` on that fill ``target``."""
     gdal = load().gdal
-    count = rows.stop - rows.start
-    into = rows.start if into is None else into
-    columns = target.shape[1]
+    count, columns = target.shape
     kind = gdal.GDT_Float32 if target.dtype == np.float32 else band.DataType
     done = heard.attempt(
-        band.ReadRaster, 0, rows.start, columns, count,
-        buf_type=kind, buf_obj=target[into : into + count],
-    )  # fmt: skip
+        band.ReadRaster, column, row, columns, count, buf_type=kind, buf_obj=target
+    )
     if done is None:
         raise InputError(
-            f"'{path}' cannot be read between rows {rows.start} and {rows.stop - 1}, "
+            f"'{path}' cannot be read between rows {row} and {row + count - 1}, "
             f"truncated or damaged: {heard.reason}"
         )
 

@@ -20,7 +20,7 @@ from demsmith.core.samples.samples import Samples
 from demsmith.core.samples.sketch import read_sketch
 from demsmith.core.samples.sources import read_sources
 from demsmith.core.samples.terrain import from_samples
-from demsmith.core.voids.filling import FILLED, ORIGINAL, SOURCE_COLORS
+from demsmith.core.voids.sources import FILLED, ORIGINAL, SOURCE_COLORS
 
 _ELEVATIONS = raster.BandMeta(unit="m", description="elevation")
 _SOURCE_NAMES = ("sample", "made between samples")

@@ -73,7 +73,7 @@ def reconstruct(
 def _fill_options(options, **changes):
     """Give the options of MCMD alone, as filling takes them."""
     own = {field.name: getattr(options, field.name) for field in fields(McmdOptions)}
-    return FillOptions(**{**own, **changes})
+    return FillOptions(method="mcmd", **{**own, **changes})
 
 
 def _from_noise(known, options, maps, *, lattice, pixel_size, threads, progress):

@@ -113,8 +113,9 @@ def _without_voids(values, known, sizes, threads, progress):
     from demsmith.core.voids import fill_voids
 
     return fill_voids(
-        values, ~known, pixel_size=sizes, float_output=True, threads=threads, progress=progress
-    ).values
+        values, ~known, method="mcmd", pixel_size=sizes, float_output=True, threads=threads,
+        progress=progress,
+    ).values  # fmt: skip
 
 
 def _keep(scores, known, count, seed, threads, progress):

@@ -8,8 +8,8 @@ import numpy as np
 from demsmith.core import parallel
 from demsmith.core.progress import SILENT, Muted, Span, checkpoint
 from demsmith.core.tuning.score import Holes, classify
+from demsmith.core.validation import SIZE_CLASSES, punch_voids
 from demsmith.core.voids.labelling import find_voids
-from demsmith.core.voids.validation import SIZE_CLASSES, punch_voids
 
 _MASKS = 2  # punched for each holdout; more give more holes, and take longer
 _SHARE = 0.2  # of the pieces of samples, for each holdout

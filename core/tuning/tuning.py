@@ -132,6 +132,7 @@ def tune_fill(
     def rebuild(trial, options, progress):
         options = replace(
             options,
+            method="mcmd",
             tune=False,
             natural_roughness=False,
             interior_only=False,

@@ -1,9 +1,10 @@
 """Voids: finding them, filling them, and telling what was done."""
 
-from demsmith.core.voids.filling import FILLED, LEFT, ORIGINAL, Filled, fill_voids
+from demsmith.core.voids.filling import Filled, fill_voids
 from demsmith.core.voids.job import FillResult, fill_file
 from demsmith.core.voids.labelling import Rims, Voids, find_voids, survey_rims
 from demsmith.core.voids.options import FillOptions
+from demsmith.core.voids.sources import FILLED, LEFT, ORIGINAL
 from demsmith.core.voids.table import VoidTable
 
 __all__ = [

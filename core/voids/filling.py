@@ -7,21 +7,21 @@ import numpy as np
 from demsmith.core.elevations import checked
 from demsmith.core.errors import InputError
 from demsmith.core.mcmd import Lattice, Maps, displacement_of, interpolate, relax_voids
+from demsmith.core.mcmd.lattice import metres
 from demsmith.core.options import options_from
 from demsmith.core.progress import SILENT, Span
+from demsmith.core.voids.accurate import (
+    SOURCE_OF_METHOD,
+    Choices,
+    Model,
+    estimate,
+    learn,
+    training_windows,
+)
 from demsmith.core.voids.labelling import Rims, Voids, find_voids, survey_rims
 from demsmith.core.voids.options import FillOptions
 from demsmith.core.voids.roughness import Roughness, roughen
-
-ORIGINAL, FILLED, LEFT = 0, 1, 2
-"""What a source map says of a cell: known before, filled, or a void that was left as it was."""
-
-SOURCE_COLORS = {
-    ORIGINAL: (217, 217, 217, 255),
-    FILLED: (214, 24, 111, 255),
-    LEFT: (0, 0, 0, 255),
-}
-"""Red, green, blue and alpha, 0 to 255, by which a source map shows them."""
+from demsmith.core.voids.sources import FILLED, LEFT, ORIGINAL
 
 _BLOCK_CELLS = 1 << 20
 
@@ -43,6 +43,13 @@ class Filled:
         What natural roughness the voids were given, if any was asked for.
     tuned : demsmith.core.tuning.Tuned or None
         What tuning found, if it was asked for and there are voids.
+    sigma : (H, W) float32 array or None
+        Standard error [m] to be expected in the cells that were filled, 0 elsewhere; None if MCMD
+        filled them.
+    choices : demsmith.core.voids.accurate.Choices or None
+        How each selected void was filled, and its expected error; None if all were by MCMD.
+    model : demsmith.core.voids.accurate.Model or None
+        What was learned of the ground for it.
     """
 
     values: np.ndarray
@@ -51,6 +58,9 @@ class Filled:
     selected: np.ndarray
     roughness: Roughness | None = None
     tuned: object = None
+    sigma: np.ndarray | None = None
+    choices: Choices | None = None
+    model: Model | None = None
 
     @property
     def cells_filled(self):
@@ -63,12 +73,18 @@ class Filled:
         Returns
         -------
         (H, W) uint8 array
-            0 original, 1 filled, 2 a void left as it was.
+            Codes of `demsmith.core.voids.sources`.
         """
         by_label = np.full(len(self.voids) + 1, LEFT, np.uint8)
         by_label[0] = ORIGINAL
-        by_label[self.selected + 1] = FILLED
+        by_label[self.selected + 1] = self.source_by_void()
         return by_label[self.voids.labels]
+
+    def source_by_void(self):
+        """Give the source map's code of each selected void."""
+        if self.choices is None:
+            return np.full(self.selected.size, FILLED, np.uint8)
+        return SOURCE_OF_METHOD[self.choices.method]
 
     def left(self):
         """Give the (H, W) bool mask of void cells that were left as they were."""
@@ -163,13 +179,19 @@ def fill_voids(
     rims = survey_rims(work, void, voids, threads=threads, progress=Span(progress, 0.1, 0.2))
     selected = _selected(voids, rims, options)
     lattice = lattice or Lattice.covering(values.shape)
-    fill = _fill_relaxed if options.variant == "relaxed" else _fill_by_passes
     filled = 0.5 if options.natural_roughness else 1
-    fill(
-        work, values, void, voids, rims, selected, options, by_cell, lattice=lattice,
-        pixel_size=pixel_size, d_max=d_max, threads=threads, progress=Span(progress, 0.2, filled),
-    )  # fmt: skip
-    roughness = None
+    fitting = dict(threads=threads, progress=Span(progress, 0.2, filled))
+    sigma = choices = model = roughness = None
+    if options.accurate and not _any_given(maps):
+        sigma, choices, model = _fill_accurately(
+            work, void, voids, selected, options, lattice, pixel_size, **fitting
+        )
+    else:
+        fill = _fill_relaxed if options.variant == "relaxed" else _fill_by_passes
+        fill(
+            work, values, void, voids, rims, selected, options, by_cell, lattice=lattice,
+            pixel_size=pixel_size, d_max=d_max, **fitting,
+        )  # fmt: skip
     if options.natural_roughness:
         roughness = roughen(
             work, voids, selected, seed=options.seed, offsets=(-lattice.row, -lattice.column),
@@ -177,7 +199,11 @@ def fill_voids(
         )  # fmt: skip
     if work is not out:
         _copy_cells(work, voids, selected, out)
-    return Filled(out, voids, rims, selected, roughness, tuned)
+    return Filled(out, voids, rims, selected, roughness, tuned, sigma, choices, model)
+
+
+def _any_given(maps):
+    return maps is not None and any(each is not None for each in vars(maps).values())
 
 
 def _refuse_contradictions(options, by_cell):
@@ -218,6 +244,24 @@ def _selected(voids, rims, options):
     if options.max_size is not None:
         wanted &= voids.cells <= options.max_size
     return np.flatnonzero(wanted)
+
+
+def _fill_accurately(
+    work, void, voids, selected, options, lattice, pixel_size, *, threads, progress
+):
+    pixel_size = metres(work.shape, pixel_size)
+    model = None
+    if selected.size:
+        model = learn(
+            training_windows(work, void, pixel_size), tension=options.tension, threads=threads,
+            progress=Span(progress, 0, 0.4),
+        )  # fmt: skip
+    sigma = np.zeros(work.shape, np.float32)
+    choices = estimate(
+        work, void, voids, selected, model, sigma=sigma, pixel_size=pixel_size,
+        tension=options.tension, lattice=lattice, threads=threads, progress=Span(progress, 0.4, 1),
+    )  # fmt: skip
+    return sigma, choices, model
 
 
 def _fill_relaxed(

@@ -5,17 +5,19 @@ import os
 import time
 from dataclasses import asdict, dataclass, fields, replace
 
+import numpy as np
+
 import demsmith
 from demsmith.core import raster
 from demsmith.core.errors import InputError
 from demsmith.core.mcmd import read_maps
 from demsmith.core.options import validate
 from demsmith.core.progress import SILENT, Span, checkpoint
-from demsmith.core.voids.filling import SOURCE_COLORS, fill_voids
+from demsmith.core.voids.filling import fill_voids
 from demsmith.core.voids.options import FillOptions
+from demsmith.core.voids.sizes import SIZE_CLASSES
+from demsmith.core.voids.sources import SOURCE_COLORS, SOURCE_NAMES
 from demsmith.core.voids.table import VoidTable, tabulate
-
-_SOURCE_NAMES = ("original", "filled", "void left as it was")
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class FillResult:
 
     Attributes
     ----------
-    output, source_map, report : str or None
+    output, source_map, uncertainty, report : str or None
         Paths of what was written.
     seconds : float
     version : str
@@ -32,6 +34,8 @@ class FillResult:
     voids, cells, cells_void, cells_filled, cells_unfilled, largest_void : int
         Number of voids found, of cells in all, in voids, filled and left, and of cells of the
         largest void.
+    reasons : tuple of str
+        How voids of each size class are filled and why; empty if nothing was learned for it.
     tuning : dict or None
         What tuning found, if it was asked for: `demsmith.core.tuning.Tuned.as_dict`.
     warnings : tuple of str
@@ -41,6 +45,7 @@ class FillResult:
 
     output: str
     source_map: str | None
+    uncertainty: str | None
     report: str | None
     seconds: float
     version: str
@@ -50,6 +55,7 @@ class FillResult:
     cells_filled: int
     cells_unfilled: int
     largest_void: int
+    reasons: tuple
     tuning: dict | None
     warnings: tuple
     table: VoidTable
@@ -63,8 +69,8 @@ class FillResult:
 
 def fill_file(
     input, output, *, options=None, maps=None, band=1, nodata=(), below=None, above=None,  # noqa: A002
-    mask=None, source_map=None, report=None, threads=None, overwrite=False, creation_options=(),
-    progress=SILENT,
+    mask=None, source_map=None, uncertainty=None, report=None, threads=None, overwrite=False,
+    creation_options=(), progress=SILENT,
 ):  # fmt: skip
     """Fill the voids of a raster file.
 
@@ -83,7 +89,10 @@ def fill_file(
         Rasters on the input's grid of options that change from cell to cell, such as
         ``{"r_s": "rough.tif"}``; see `demsmith.core.mcmd.Maps`.
     source_map : path, optional
-        GeoTIFF of bytes: 0 original, 1 filled, 2 a void left as it was.
+        GeoTIFF of bytes: the codes of `demsmith.core.voids.sources`.
+    uncertainty : path, optional
+        GeoTIFF of the standard error to be expected in each filled cell, 0 in known ones, in the
+        raster's unit; only the accurate engine knows it.
     report : path, optional
         JSON file with the result, the options and the table of voids.
     threads : int, optional
@@ -113,7 +122,9 @@ def fill_file(
     validate(options)
     maps = {name: os.fspath(path) for name, path in (maps or {}).items()}
     inputs = [path for path in (input, mask, *maps.values()) if path is not None]
-    paths = _checked_outputs(inputs, output, source_map, report, overwrite)
+    paths = _checked_outputs(inputs, output, source_map, uncertainty, report, overwrite)
+    if uncertainty and (maps or not options.accurate):
+        raise InputError("an uncertainty needs the method auto, without options of MCMD's own")
     source = raster.read(
         input, band=band, nodata=nodata, below=below, above=above, mask=mask,
         progress=Span(progress, 0, 0.1),
@@ -134,7 +145,13 @@ def fill_file(
             raster.write(
                 part["source_map"], filled.source(), dtype="uint8", nodata=None,
                 description="source", same_quantity=False, color_table=SOURCE_COLORS,
-                categories=_SOURCE_NAMES, progress=Span(progress, 0.95, 1), **writing,
+                categories=SOURCE_NAMES, progress=Span(progress, 0.95, 1), **writing,
+            )  # fmt: skip
+        if uncertainty:
+            raster.write(
+                part["uncertainty"], _sigma(filled, source.meta), void=left, dtype="float32",
+                nodata=-1.0, description="standard error", same_quantity=False,
+                progress=Span(progress, 0.97, 1), **writing,
             )  # fmt: skip
         result = replace(result, seconds=round(time.perf_counter() - begin, 3))
         if report:
@@ -143,17 +160,18 @@ def fill_file(
     return result
 
 
-def _checked_outputs(inputs, output, source_map, report, overwrite):
+def _checked_outputs(inputs, output, source_map, uncertainty, report, overwrite):
     raster.check_output(output, inputs=inputs, overwrite=overwrite)
-    if source_map:
-        raster.check_output(source_map, inputs=inputs, overwrite=overwrite)
+    for path in (source_map, uncertainty):
+        if path:
+            raster.check_output(path, inputs=inputs, overwrite=overwrite)
     if report:
         raster.check_place(report, inputs=inputs, overwrite=overwrite)
-    paths = {"output": output, "source_map": source_map, "report": report}
+    paths = dict(output=output, source_map=source_map, uncertainty=uncertainty, report=report)
     paths = {name: os.fspath(path) if path else None for name, path in paths.items()}
     named = [os.path.realpath(path) for path in paths.values() if path]
     if len(set(named)) < len(named):
-        raise InputError("output, source map and report must be different files")
+        raise InputError("the outputs must be different files")
     return paths
 
 
@@ -174,6 +192,13 @@ def _fill(source, options, maps, threads, progress):
         raise InputError(f"'{source.source}': {error}") from None
 
 
+def _sigma(filled, meta):
+    """Give the standard errors in the raster's unit, of voids that were left too."""
+    if filled.sigma is None:
+        return np.zeros(filled.values.shape, np.float32)
+    return filled.sigma * np.float32(abs(meta.scale))
+
+
 def _result(source, filled, paths, begin):
     cells = filled.voids.cells
     warnings = list(source.notes)
@@ -191,10 +216,21 @@ def _result(source, filled, paths, begin):
         cells_filled=filled.cells_filled,
         cells_unfilled=int(cells.sum()) - filled.cells_filled,
         largest_void=int(cells.max(initial=0)),
+        reasons=_reasons(filled.model),
         tuning=filled.tuned and filled.tuned.as_dict(),
         warnings=tuple(warnings),
         table=tabulate(filled, source.grid, source.meta),
     )
+
+
+def _reasons(model):
+    if model is None:
+        return ()
+    return tuple(
+        f"{smallest} to {largest} cells: {model.reason(k)}" if largest
+        else f"{smallest} cells and more: {model.reason(k)}"
+        for k, (smallest, largest) in enumerate(SIZE_CLASSES)
+    )  # fmt: skip
 
 
 def _write_report(path, result, options, maps, source, band):

@@ -84,7 +84,7 @@ def find_voids(void, *, threads=None, progress=SILENT):
     >>> voids.cells
     array([2, 1, 2])
     """
-    from demsmith.core.voids import _labelling
+    from demsmith.core.voids._labelling import paint
 
     if void.ndim != 2 or void.dtype != bool:
         raise InputError(f"the void mask is {void.ndim}-D {void.dtype}; give a 2-D bool array")
@@ -93,11 +93,33 @@ def find_voids(void, *, threads=None, progress=SILENT):
     labels = np.empty(void.shape, np.int32)
     found = []
     parallel.run(
-        [lambda: found.append(_scan(void)), lambda: labels.fill(0)],
+        [lambda: found.append(find_runs(void)), lambda: labels.fill(0)],
         threads=threads if void.size > _LARGE else 1,
         progress=Span(progress, 0, 0.3),
     )
-    runs = found[0]
+    grouped, first_run, cells = join_runs(found[0], progress=Span(progress, 0.3, 0.8))
+    paint(grouped, first_run, labels)
+    checkpoint(progress, 1.0)
+    return Voids(labels, grouped, first_run, cells)
+
+
+def join_runs(runs, *, progress=SILENT):
+    """Join runs of void cells into 4-connected voids, numbered in the order of their first cells.
+
+    Parameters
+    ----------
+    runs : (N, 3) int32 array
+        Row, first column and one past the last column of each, sorted; none touches the next one
+        of its row.
+    progress : Progress
+
+    Returns
+    -------
+    runs, first_run, cells : arrays
+        As in `Voids`.
+    """
+    from demsmith.core.voids import _labelling
+
     void_of_run = np.empty(len(runs), np.int64)
     count = _labelling.join_runs(runs, void_of_run)
     checkpoint(progress, 0.6)
@@ -105,13 +127,12 @@ def find_voids(void, *, threads=None, progress=SILENT):
     cells = np.zeros(count, np.int64)
     grouped = np.empty_like(runs)
     _labelling.group_runs(runs, void_of_run, first_run, grouped, cells)
-    checkpoint(progress, 0.8)
-    _labelling.paint(grouped, first_run, labels)
     checkpoint(progress, 1.0)
-    return Voids(labels, grouped, first_run, cells)
+    return grouped, first_run, cells
 
 
-def _scan(void):
+def find_runs(void):
+    """List the runs of void cells of a C-ordered bool mask: (N, 3) int32, as `join_runs` has."""
     from demsmith.core.voids._labelling import scan_runs
 
     flat = void.view(np.uint8).ravel()

@@ -1,6 +1,6 @@
 """The options of void filling."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from demsmith.core.mcmd.options import McmdOptions
 from demsmith.core.options import option
@@ -14,9 +14,11 @@ class FillOptions(McmdOptions):
     """
 
     method: str = option(
-        str, "mcmd", "Method",
-        "mcmd: constrained midpoint displacement (Belhadj 2007), every generation relaxed.",
-        choices=("mcmd",),
+        str, "auto", "Method",
+        "auto: the most accurate, learned from the raster's own ground void size by void size "
+        "(MCMD, if one of MCMD's own options is set). "
+        "mcmd: constrained midpoint displacement (Belhadj 2007), the fastest.",
+        choices=("auto", "mcmd"),
     )  # fmt: skip
     natural_roughness: bool = option(
         bool, False, "Natural roughness",
@@ -42,3 +44,13 @@ class FillOptions(McmdOptions):
         "Write Float32 instead of the input's data type, so that filled ground is not rounded.",
         flag="float",
     )  # fmt: skip
+
+    @property
+    def accurate(self):
+        """Whether the accurate engine fills: no option asks for MCMD itself."""
+        own = {field.name for field in fields(McmdOptions)} - {"tension", "seed"} | {"tune"}
+        return self.method == "auto" and all(
+            getattr(self, field.name) == field.default
+            for field in fields(self)
+            if field.name in own
+        )

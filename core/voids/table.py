@@ -5,6 +5,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from demsmith.core.voids.roughness import Roughness
+from demsmith.core.voids.sizes import SIZE_CLASSES, size_class
+from demsmith.core.voids.sources import SOURCE_NAMES
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,12 @@ class VoidTable:
     roughness_h, roughness : float64
         Exponent H of the natural roughness that was added, and its largest displacement at the
         finest level in the raster's unit; NaN if none was asked for.
+    method : text
+        By what it was filled, as a source map's legend says it; empty if it was left.
+    expected_error : float64
+        Root mean square error to be expected, in the raster's unit; NaN if that is not known.
+    reason : text
+        Why it was filled so; empty if nothing was learned for it.
     """
 
     id: np.ndarray
@@ -50,6 +58,9 @@ class VoidTable:
     filled: np.ndarray
     roughness_h: np.ndarray
     roughness: np.ndarray
+    method: np.ndarray
+    expected_error: np.ndarray
+    reason: np.ndarray
 
     def __len__(self):
         return self.id.size
@@ -89,6 +100,14 @@ def tabulate(filled, grid, meta):
     low, high = ends.min(axis=0), ends.max(axis=0)
     is_filled = np.zeros(count, bool)
     is_filled[filled.selected] = True
+    method, reason = np.full(count, "", object), np.full(count, "", object)
+    method[filled.selected] = np.array(SOURCE_NAMES, object)[filled.source_by_void()]
+    error = np.full(count, np.nan)
+    if filled.choices is not None:
+        error[filled.selected] = filled.choices.error * abs(meta.scale)
+    if filled.model is not None:
+        reasons = np.array([filled.model.reason(k) for k in range(len(SIZE_CLASSES))], object)
+        reason[filled.selected] = reasons[size_class(voids.cells[filled.selected])]
     rough = filled.roughness or Roughness(np.full(count, np.nan), np.full(count, np.nan))
     return VoidTable(
         id=np.arange(1, count + 1), row=row, column=column, x=centre.x, y=centre.y,
@@ -96,4 +115,5 @@ def tabulate(filled, grid, meta):
         rim_low=low, rim_mean=meta.real(filled.rims.mean), rim_high=high, rim_relief=high - low,
         touches_edge=filled.rims.touches_edge, filled=is_filled,
         roughness_h=rough.h, roughness=rough.amplitude * abs(meta.scale),
+        method=method.astype(str), expected_error=error, reason=reason.astype(str),
     )  # fmt: skip

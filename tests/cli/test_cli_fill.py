@@ -79,9 +79,11 @@ def test_summary_without_voids(demsmith, tmp_path, output):
 
 def test_json(demsmith, dem, output):
     source_map, report = output.with_name("source.tif"), output.with_name("report.json")
+    sigma = output.with_name("sigma.tif")
     status, out, err = demsmith(
-        "fill", dem, output, "--json", "--source-map", source_map, "--report", report
-    )
+        "fill", dem, output, "--json", "--source-map", source_map, "--report", report,
+        "--uncertainty", sigma,
+    )  # fmt: skip
     result = json.loads(out)
     assert (status, err) == (0, "")
     assert len(out.splitlines()) == 1
@@ -93,8 +95,26 @@ def test_json(demsmith, dem, output):
     assert result["report"] == str(report)
     assert (result["voids"], result["cells_filled"], result["cells_unfilled"]) == (2, 18, 0)
     assert result["seconds"] > 0
-    assert raster.read(source_map).values.sum() == 18
+    assert result["uncertainty"] == str(sigma)
+    assert len(result["reasons"]) == 4
+    assert np.count_nonzero(raster.read(source_map).values) == 18
+    assert np.count_nonzero(raster.read(sigma).values) == 18
     assert len(json.loads(report.read_text())["void_table"]) == 2
+
+
+def test_methods(demsmith, dem, output):
+    """MCMD is another fill, has no uncertainty, and says so before it begins."""
+    made = []
+    for method in ("auto", "mcmd"):
+        words = ("--method", method, "--float", "--overwrite")
+        assert demsmith("fill", dem, output, *words).status == 0
+        made.append(digest(output))
+    assert made[0] != made[1]
+    output.unlink()
+    outcome = demsmith(
+        "fill", dem, output, "--method", "mcmd", "--uncertainty", output.with_name("sigma.tif")
+    )
+    assert_refused(outcome, "method auto", output)
 
 
 def test_quiet_says_nothing(demsmith, tmp_path, output):

@@ -104,7 +104,9 @@ def test_help_of_every_option(fill_help, spec):
 
 def test_help_has_nothing_that_nobody_defined(fill_help):
     ours = {word_of(spec) for spec in [*SPECS, *MAPS]}
-    assert set(fill_help) == {*ours, *SHARED, "INPUT", "OUTPUT", "--source-map", "--report"}
+    assert set(fill_help) == {
+        *ours, *SHARED, "INPUT", "OUTPUT", "--source-map", "--uncertainty", "--report",
+    }  # fmt: skip
 
 
 def test_mcmd_options_have_a_group_of_their_own(demsmith):
@@ -134,7 +136,8 @@ def test_every_map_reaches_the_fill(fill_call, spec):
 def test_every_parameter_of_the_fill_is_reached(fill_call):
     given = fill_call(
         "--band", 2, "--nodata", -9999, "--below", -500, "--above", 9000, "--mask", "m.tif",
-        "--source-map", "s.tif", "--report", "r.json", "--threads", 3, "--overwrite",
+        "--source-map", "s.tif", "--uncertainty", "u.tif", "--report", "r.json", "--threads", 3,
+        "--overwrite",
         "--creation-option", "COMPRESS=LZW", "--creation-option", "TILED=NO",
         "--h-map", "h.tif", "--r-s-map", "r.tif",
     )  # fmt: skip
@@ -143,7 +146,7 @@ def test_every_parameter_of_the_fill_is_reached(fill_call):
     assert given == dict(
         input="in.tif", output="out.tif", maps={"h": "h.tif", "r_s": "r.tif"}, band=2,
         nodata=(-9999.0,), below=-500.0, above=9000.0, mask="m.tif",
-        source_map="s.tif", report="r.json", threads=3, overwrite=True,
+        source_map="s.tif", uncertainty="u.tif", report="r.json", threads=3, overwrite=True,
         creation_options=("COMPRESS=LZW", "TILED=NO"),
     )  # fmt: skip
 

@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scenes import fractal, plane
+from support import fill_by_mcmd
 
 from demsmith.core.errors import Cancelled, InputError
 from demsmith.core.mcmd._converged import gradient
 from demsmith.core.mcmd.converged import converge
-from demsmith.core.voids import fill_voids
 
 
 def scattered(shape, share, seed=0):
@@ -89,7 +89,7 @@ def test_known_cells_stay_and_a_plane_comes_back():
 def test_more_accurate_than_relaxed_on_fractal_ground():
     z = fractal((200, 220))
     known = scattered(z.shape, 0.05)
-    relaxed = fill_voids(z, ~known).values
+    relaxed = fill_by_mcmd(z, ~known).values
     found = converge(relaxed, known)
 
     def rmse(surface):
@@ -108,7 +108,7 @@ def test_as_accurate_as_thin_plate_splines():
     everywhere = np.stack([axis.ravel() for axis in np.indices(z.shape)], axis=1)
     spline = RBFInterpolator(np.stack([row, column], axis=1).astype(float), z[known])
     peer = spline(everywhere.astype(float)).reshape(z.shape)
-    found = converge(fill_voids(z, ~known).values, known)
+    found = converge(fill_by_mcmd(z, ~known).values, known)
     error = [np.sqrt(((surface - z)[~known] ** 2).mean()) for surface in (found, peer)]
     assert error[0] < 1.02 * error[1]
 
@@ -117,7 +117,7 @@ def test_metres_not_cells():
     """On cells twice as high as wide, ground made in metres comes back better by metres."""
     z = fractal((160, 320), seed=5)[:, ::2]
     known = scattered(z.shape, 0.05)
-    start = fill_voids(z, ~known).values
+    start = fill_by_mcmd(z, ~known).values
 
     def rmse(pixel_size):
         found = converge(start, known, pixel_size=pixel_size)
@@ -138,7 +138,7 @@ def test_shift_and_scale_pass_through(start, seed):
 def test_same_bytes_for_any_number_of_threads():
     z = fractal((150, 90))
     known = scattered(z.shape, 0.08)
-    start = fill_voids(z, ~known).values
+    start = fill_by_mcmd(z, ~known).values
     assert np.array_equal(
         converge(start, known, threads=1), converge(start, known, threads=3), equal_nan=True
     )
@@ -161,7 +161,7 @@ def test_nothing_to_change():
 def test_cancel_and_progress():
     z = fractal((120, 120))
     known = scattered(z.shape, 0.02)
-    start = fill_voids(z, ~known).values
+    start = fill_by_mcmd(z, ~known).values
     told = []
 
     class Watch:

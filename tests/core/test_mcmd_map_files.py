@@ -6,7 +6,7 @@ import os
 import numpy as np
 import pytest
 from scenes import disc, fractal
-from support import WGS84_3ARC, digest, make_raster
+from support import WGS84_3ARC, digest, fill_by_mcmd, make_raster
 
 from demsmith.core import raster
 from demsmith.core.errors import Cancelled, InputError
@@ -14,7 +14,7 @@ from demsmith.core.mcmd import MapFiles, Maps, McmdOptions, read_maps
 from demsmith.core.mcmd.maps import MAP_NAMES
 from demsmith.core.options import specifications
 from demsmith.core.raster import Grid
-from demsmith.core.voids import FillOptions, fill_file, fill_voids
+from demsmith.core.voids import FillOptions, fill_file
 
 SHAPE = (40, 50)
 GRID = Grid(SHAPE, WGS84_3ARC, "EPSG:4326")
@@ -112,7 +112,7 @@ def test_fill_as_the_array_function_does(tmp_path, dem, rough, variant):
         report=tmp_path / "report.json",
     )  # fmt: skip
     source = raster.read(dem)
-    expected = fill_voids(
+    expected = fill_by_mcmd(
         source.values, source.void, variant=variant, maps=Maps(r_s=STEP.astype(np.float32)),
         pixel_size=source.grid.pixel_size_m(),
     ).values  # fmt: skip

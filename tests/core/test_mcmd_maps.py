@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import disc, fractal, holed, plane
+from support import fill_by_mcmd
 
 from demsmith.core.errors import InputError
 from demsmith.core.mcmd import Displacement, Lattice, Maps, McmdOptions, bottom_up, interpolate
 from demsmith.core.mcmd._displacement import uniform
 from demsmith.core.options import specifications
-from demsmith.core.voids import fill_voids
 
 VARIANTS = ("relaxed", "weighted", "paper")
 SCHEMES = ("triangle-edge", "diamond-square")
@@ -49,10 +49,10 @@ def test_a_uniform_map_is_the_number(variant, scheme):
         variant=variant, scheme=scheme, seed=5, lattice=Lattice(-7, -11, 7), pixel_size=(60, 90)
     )
     numbers = parameters_of(variant)
-    expected = fill_voids(truth, void, **settings_, **numbers).values
-    assert (expected != fill_voids(truth, void, **settings_).values)[void].mean() > 0.5
+    expected = fill_by_mcmd(truth, void, **settings_, **numbers).values
+    assert (expected != fill_by_mcmd(truth, void, **settings_).values)[void].mean() > 0.5
     for threads in (1, 2):
-        filled = fill_voids(
+        filled = fill_by_mcmd(
             truth, void, maps=everywhere(numbers, truth.shape), threads=threads, **settings_
         )
         np.testing.assert_array_equal(filled.values, expected)
@@ -68,9 +68,9 @@ def test_where_a_map_has_no_number_the_option_holds(variant):
     masked = {name: np.ma.masked_invalid(values) for name, values in holey.items()}
     for values in masked.values():
         values.data[values.mask] = 77  # out of every range, or far from the number
-    expected = fill_voids(truth, void, variant=variant, **numbers).values
+    expected = fill_by_mcmd(truth, void, variant=variant, **numbers).values
     for maps in (Maps(**holey), Maps(**masked)):
-        filled = fill_voids(truth, void, variant=variant, maps=maps, **numbers).values
+        filled = fill_by_mcmd(truth, void, variant=variant, maps=maps, **numbers).values
         np.testing.assert_array_equal(filled, expected)
 
 
@@ -88,9 +88,9 @@ def test_any_type_and_memory_order(dtype, shape, turned, random):
     rough = np.array([[random.randint(0, 1) for _ in range(shape[1])] for _ in range(shape[0])])
     given = rough.astype(dtype)
     given = given.T.copy().T if turned else given
-    expected = fill_voids(values, void, maps=Maps(r_s=rough.astype(float)), relief=9.0).values
+    expected = fill_by_mcmd(values, void, maps=Maps(r_s=rough.astype(float)), relief=9.0).values
     before = given.copy()
-    filled = fill_voids(values, void, maps=Maps(r_s=given), relief=9.0).values
+    filled = fill_by_mcmd(values, void, maps=Maps(r_s=given), relief=9.0).values
     np.testing.assert_array_equal(filled, expected)
     np.testing.assert_array_equal(given, before)
 
@@ -128,8 +128,8 @@ def test_rough_on_one_side_smooth_on_the_other(variant):
     void = disc(shape, (30, 60), 25) | disc(shape, (30, 200), 25) | holed(shape, (70, 120, 40, 220))
     r_s = np.zeros(shape)
     r_s[:, 128:] = 0.4
-    smooth = fill_voids(truth, void, variant=variant).values
-    added = fill_voids(truth, void, variant=variant, maps=Maps(r_s=r_s)).values - smooth
+    smooth = fill_by_mcmd(truth, void, variant=variant).values
+    added = fill_by_mcmd(truth, void, variant=variant, maps=Maps(r_s=r_s)).values - smooth
     assert (added[~void] == 0).all()
     if variant == "relaxed":  # the passes' coarse points are shared by all voids
         assert (added[disc(shape, (30, 60), 25)] == 0).all()
@@ -147,9 +147,9 @@ def test_h_and_r_t_matter_where_they_are_mapped(variant):
     void = disc(shape, (64, 60), 40) | disc(shape, (64, 200), 40)
     east = np.arange(shape[1]) >= 128
     h, r_t = (np.broadcast_to(row, shape) for row in (np.where(east, 0.2, 0.5), 5.0 * ~east))
-    plain = fill_voids(truth, void, variant=variant, r_s=0.2).values
-    shaped = fill_voids(truth, void, variant=variant, r_s=0.2, maps=Maps(h=h)).values
-    lifted = fill_voids(truth, void, variant=variant, r_s=0.2, maps=Maps(r_t=r_t)).values
+    plain = fill_by_mcmd(truth, void, variant=variant, r_s=0.2).values
+    shaped = fill_by_mcmd(truth, void, variant=variant, r_s=0.2, maps=Maps(h=h)).values
+    lifted = fill_by_mcmd(truth, void, variant=variant, r_s=0.2, maps=Maps(r_t=r_t)).values
 
     def roughness(z, columns):
         return np.abs(np.diff(z[40:90, columns], 2, axis=1)).mean()
@@ -170,8 +170,8 @@ def test_one_cells_strength(variant):
     r_s = np.zeros(truth.shape)
     r_s[31, 35] = 2.0
     options = dict(variant=variant, relief=1000.0, h=0.3, seed=4)
-    plain = fill_voids(truth, void, **options).values
-    added = fill_voids(truth, void, maps=Maps(r_s=r_s), **options).values - plain
+    plain = fill_by_mcmd(truth, void, **options).values
+    added = fill_by_mcmd(truth, void, maps=Maps(r_s=r_s), **options).values - plain
     levels = Lattice.covering(truth.shape).levels
     assert added[31, 35] == pytest.approx(
         uniform(4, 31, 35) * 2000 * 2 ** (-2 * 0.3 * levels), abs=1e-9
@@ -182,10 +182,10 @@ def test_one_cells_strength(variant):
 
 def test_a_map_of_strength_overrules_the_option():
     truth, void = plane((40, 40)), disc((40, 40), (20, 20), 10)
-    smooth = fill_voids(truth, void).values
+    smooth = fill_by_mcmd(truth, void).values
     none, some = Maps(r_s=np.zeros(truth.shape)), Maps(r_s=np.full(truth.shape, 0.3))
-    np.testing.assert_array_equal(fill_voids(truth, void, r_s=0.3, maps=none).values, smooth)
-    assert (fill_voids(truth, void, maps=some).values != smooth)[void].mean() > 0.5
+    np.testing.assert_array_equal(fill_by_mcmd(truth, void, r_s=0.3, maps=none).values, smooth)
+    assert (fill_by_mcmd(truth, void, maps=some).values != smooth)[void].mean() > 0.5
 
 
 # --- curves --------------------------------------------------------------------------------------
@@ -256,30 +256,30 @@ def test_ranges_are_the_options(name, side):
         values[5, 7] = wrong
         words = f"the map of {name} is .* at row 5, column 7; .* {spec.minimum:g} to"
         with pytest.raises(InputError, match=words):
-            fill_voids(VALUES, VOID, variant="paper", maps=Maps(**{name: values}))
+            fill_by_mcmd(VALUES, VOID, variant="paper", maps=Maps(**{name: values}))
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_shape_and_type(name):
     with pytest.raises(InputError, match=rf"map of {name} has shape \(9, 8\), .*\(8, 9\)"):
-        fill_voids(VALUES, VOID, variant="paper", maps=Maps(**{name: np.zeros((9, 8))}))
+        fill_by_mcmd(VALUES, VOID, variant="paper", maps=Maps(**{name: np.zeros((9, 8))}))
     with pytest.raises(InputError, match=f"map of {name} is of type"):
-        fill_voids(VALUES, VOID, variant="paper", maps=Maps(**{name: np.full((8, 9), "0")}))
+        fill_by_mcmd(VALUES, VOID, variant="paper", maps=Maps(**{name: np.full((8, 9), "0")}))
 
 
 @pytest.mark.parametrize("name", ["l", "l_bu"])
 def test_relaxed_has_no_curves(name):
     curve = np.zeros(VALUES.shape)
-    fill_voids(VALUES, VOID, maps=Maps(**{name: curve}))
+    fill_by_mcmd(VALUES, VOID, maps=Maps(**{name: curve}))
     curve[7, 8] = 0.1
     with pytest.raises(InputError, match="'relaxed' has no such curve"):
-        fill_voids(VALUES, VOID, maps=Maps(**{name: curve}))
+        fill_by_mcmd(VALUES, VOID, maps=Maps(**{name: curve}))
 
 
 def test_natural_roughness_wants_no_map_of_strength():
     r_s = np.full(VALUES.shape, 0.1)
     with pytest.raises(InputError, match="natural_roughness finds"):
-        fill_voids(VALUES, VOID, natural_roughness=True, maps=Maps(r_s=r_s))
+        fill_by_mcmd(VALUES, VOID, natural_roughness=True, maps=Maps(r_s=r_s))
 
 
 def test_the_passes_alone_check_shapes_too():

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scenes import disc, holed, plane
+from support import fill_by_mcmd
 
 from demsmith.core.errors import InputError
 from demsmith.core.mcmd import Displacement, Lattice, interpolate
 from demsmith.core.mcmd._displacement import uniform
-from demsmith.core.voids import fill_voids
 
 
 def draw(seed, rows, columns):
@@ -101,7 +101,7 @@ def test_noise_in_a_void(variant):
     """It roughens voids by the order of its strength, depends on the seed, ends at the rim."""
     truth, void = plane((129, 129), slope=(0.5, 0.5)), disc((129, 129), (64, 64), 40)
     fills = {
-        (r_s, seed): fill_voids(truth, void, variant=variant, r_s=r_s, seed=seed).values
+        (r_s, seed): fill_by_mcmd(truth, void, variant=variant, r_s=r_s, seed=seed).values
         for r_s, seed in [(0, 0), (0, 1), (0.5, 0), (0.5, 1), (1.0, 0)]
     }
     np.testing.assert_array_equal(fills[0, 0], fills[0, 1])
@@ -124,17 +124,19 @@ def test_noise_relief_of_integers(dtype, variant):
         values[:, ::2] = -100
     void = disc(values.shape, (10, 10), 6)
     relief = float(values.max()) - float(values.min())
-    given = fill_voids(values, void, variant=variant, r_s=0.3, relief=relief).values
-    np.testing.assert_array_equal(fill_voids(values, void, variant=variant, r_s=0.3).values, given)
-    assert (given != fill_voids(values, void, variant=variant).values).any()
+    given = fill_by_mcmd(values, void, variant=variant, r_s=0.3, relief=relief).values
+    np.testing.assert_array_equal(
+        fill_by_mcmd(values, void, variant=variant, r_s=0.3).values, given
+    )
+    assert (given != fill_by_mcmd(values, void, variant=variant).values).any()
 
 
 def test_relief_is_of_known_cells_only():
     values, void = plane((40, 40)), disc((40, 40), (20, 20), 8)
     spoilt = np.where(void, 1e6, values)
     np.testing.assert_array_equal(
-        fill_voids(values, void, r_s=0.4).values[void],
-        fill_voids(spoilt, void, r_s=0.4).values[void],
+        fill_by_mcmd(values, void, r_s=0.4).values[void],
+        fill_by_mcmd(spoilt, void, r_s=0.4).values[void],
     )
 
 
@@ -144,10 +146,10 @@ def test_noise_of_a_tile_is_the_mosaics():
     mosaic = np.cumsum(rng.normal(size=(120, 150)), axis=1).astype(np.float32)
     void = holed(mosaic.shape, (60, 77, 70, 95), (10, 14, 60, 61), (100, 103, 100, 103))
     options = dict(r_s=0.2, relief=50.0, seed=11)
-    whole = fill_voids(mosaic, void, **options).values
+    whole = fill_by_mcmd(mosaic, void, **options).values
     lattice = Lattice(-17, -23, Lattice.covering(mosaic.shape).levels)
     tile, tile_void = mosaic[17:, 23:].copy(), void[17:, 23:].copy()
-    part = fill_voids(tile, tile_void, lattice=lattice, **options).values
+    part = fill_by_mcmd(tile, tile_void, lattice=lattice, **options).values
     far = holed(mosaic.shape, (60, 77, 70, 95), (100, 103, 100, 103))[17:, 23:]
     np.testing.assert_array_equal(part[far], whole[17:, 23:][far])
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scenes import diagonal_stripes, disc, fractal, holed, plane, river
 from scipy.ndimage import gaussian_filter
+from support import fill_by_mcmd
 
 from demsmith.core.mcmd import Lattice, relaxed
-from demsmith.core.voids import fill_voids, find_voids
+from demsmith.core.voids import find_voids
 
 SHAPE = (160, 170)
 
@@ -51,7 +52,7 @@ def test_planes(scale, pixel_size, bound):
     total = []
     for seed in range(3):
         void = blobs(scale, seed=seed)
-        filled = fill_voids(truth, void, pixel_size=pixel_size).values
+        filled = fill_by_mcmd(truth, void, pixel_size=pixel_size).values
         assert worst_by_relief(filled, truth, void) < bound
         total.append(abs(filled - truth)[void].mean())
     assert np.mean(total) < 0.002 * 5 * (2 * scale + 2)
@@ -60,7 +61,7 @@ def test_planes(scale, pixel_size, bound):
 @pytest.mark.parametrize("radius", [10, 20, 40])
 def test_planes_in_large_round_voids(radius):
     truth, void = plane(SHAPE), disc(SHAPE, (78, 87), radius)
-    filled = fill_voids(truth, void, pixel_size=(70.0, 90.0)).values
+    filled = fill_by_mcmd(truth, void, pixel_size=(70.0, 90.0)).values
     assert abs(filled - truth)[void].max() < 1e-3 * np.ptp(truth[void])
 
 
@@ -68,7 +69,7 @@ def test_planes_in_large_round_voids(radius):
 def test_planes_at_the_edge(box):
     """Free edges extrapolate: within 13 % of the relief, in a corner of 40 × 40 cells."""
     truth, void = plane(SHAPE), holed(SHAPE, box)
-    assert worst_by_relief(fill_voids(truth, void).values, truth, void) < 0.13
+    assert worst_by_relief(fill_by_mcmd(truth, void).values, truth, void) < 0.13
 
 
 def test_quadratic_surfaces():
@@ -77,28 +78,30 @@ def test_quadratic_surfaces():
     truth = row**2 + 0.5 * column**2 + row * column + 300 * row
     for scale, bound in ((2, 0.05), (4, 0.05)):
         void = blobs(scale)
-        filled = fill_voids(truth, void).values
+        filled = fill_by_mcmd(truth, void).values
         assert worst_by_relief(filled, truth, void) < bound
     void = disc(SHAPE, (80, 85), 12)
-    loose, taut = (fill_voids(truth, void, tension=t).values - truth for t in (1e6, 3.0))
+    loose, taut = (fill_by_mcmd(truth, void, tension=t).values - truth for t in (1e6, 3.0))
     assert abs(loose[void]).max() < 0.2 * abs(taut[void]).max()
 
 
 def test_tension_is_in_metres():
     """The same ground at 30 m: a tension length of 90 m is one of 3 cells."""
     truth, void = fractal(SHAPE, seed=4), disc(SHAPE, (80, 80), 25)
-    by_cells = fill_voids(truth, void, tension=3.0).values
-    by_metres = fill_voids(truth, void, tension=90.0, pixel_size=30.0).values
+    by_cells = fill_by_mcmd(truth, void, tension=3.0).values
+    by_metres = fill_by_mcmd(truth, void, tension=90.0, pixel_size=30.0).values
     np.testing.assert_allclose(by_metres, by_cells, rtol=1e-12)
-    assert abs(by_cells - fill_voids(truth, void).values).max() > 1
-    twelve = fill_voids(truth, void, tension=360.0, pixel_size=30.0).values
-    np.testing.assert_allclose(twelve, fill_voids(truth, void, pixel_size=30.0).values, rtol=1e-12)
+    assert abs(by_cells - fill_by_mcmd(truth, void).values).max() > 1
+    twelve = fill_by_mcmd(truth, void, tension=360.0, pixel_size=30.0).values
+    np.testing.assert_allclose(
+        twelve, fill_by_mcmd(truth, void, pixel_size=30.0).values, rtol=1e-12
+    )
 
 
 def test_least_bending():
     """No surface of the same rim that we try bends less than 1.01 times the filled one."""
     truth, void = fractal((60, 60), seed=2), disc((60, 60), (30, 30), 9)
-    filled = fill_voids(truth, void, tension=1e6).values
+    filled = fill_by_mcmd(truth, void, tension=1e6).values
     assert bending(filled) < bending(truth)
     rng = np.random.default_rng(0)
     for scale in (0.5, 1, 2, 4):
@@ -123,9 +126,9 @@ def bending(z):
 def test_shift_and_scale(variant):
     """Without curves, a filled raster moves and stretches with its input."""
     truth, void = fractal(SHAPE, seed=1), blobs(3) | disc(SHAPE, (20, 20), 25)
-    filled = fill_voids(truth, void, variant=variant).values
+    filled = fill_by_mcmd(truth, void, variant=variant).values
     for factor, shift in ((1, 5000.0), (-2.5, 0), (0.001, -3)):
-        again = fill_voids(factor * truth + shift, void, variant=variant).values
+        again = fill_by_mcmd(factor * truth + shift, void, variant=variant).values
         np.testing.assert_allclose(again, factor * filled + shift, rtol=0, atol=1e-9)
 
 
@@ -137,12 +140,12 @@ def test_mirrored_and_transposed(pixel_size):
     shape = (129, 129)
     truth = fractal(shape, seed=3)
     void = blobs(3, shape=shape, margin=10) | disc(shape, (64, 64), 20)
-    filled = fill_voids(truth, void, pixel_size=pixel_size).values
+    filled = fill_by_mcmd(truth, void, pixel_size=pixel_size).values
     relief = np.ptp(truth)
     # 129 = 2^7 + 1: the mirrored lattice is itself.
-    across = fill_voids(truth[:, ::-1], void[:, ::-1], pixel_size=pixel_size).values[:, ::-1]
-    upside = fill_voids(truth[::-1], void[::-1], pixel_size=pixel_size).values[::-1]
-    swapped = fill_voids(truth.T, void.T, pixel_size=pixel_size[::-1]).values.T
+    across = fill_by_mcmd(truth[:, ::-1], void[:, ::-1], pixel_size=pixel_size).values[:, ::-1]
+    upside = fill_by_mcmd(truth[::-1], void[::-1], pixel_size=pixel_size).values[::-1]
+    swapped = fill_by_mcmd(truth.T, void.T, pixel_size=pixel_size[::-1]).values.T
     for other in (across, upside, swapped):
         difference = abs(other - filled)[void]
         assert difference.max() < 0.03 * relief
@@ -154,10 +157,10 @@ def test_pixel_sizes_by_row():
     """Equal rows given one by one are the same as a number; unequal ones matter."""
     truth, void = fractal(SHAPE, seed=5), blobs(4)
     rows = np.ones(SHAPE[0])
-    by_number = fill_voids(truth, void, pixel_size=(70.0, 90.0)).values
-    by_row = fill_voids(truth, void, pixel_size=(70 * rows, 90 * rows)).values
+    by_number = fill_by_mcmd(truth, void, pixel_size=(70.0, 90.0)).values
+    by_row = fill_by_mcmd(truth, void, pixel_size=(70 * rows, 90 * rows)).values
     np.testing.assert_array_equal(by_row, by_number)
-    narrowing = fill_voids(truth, void, pixel_size=(np.linspace(90, 20, SHAPE[0]), 90.0)).values
+    narrowing = fill_by_mcmd(truth, void, pixel_size=(np.linspace(90, 20, SHAPE[0]), 90.0)).values
     assert abs(narrowing - by_number)[void].max() > 0.1
 
 
@@ -174,12 +177,12 @@ def test_voids_do_not_know_each_other(r_s):
     options = dict(r_s=r_s, relief=100.0)
     # The others' cells are voids in any case; only one is filled.
     voids = find_voids(together)
-    whole = fill_voids(truth, together, **options).values
+    whole = fill_by_mcmd(truth, together, **options).values
     for number in range(len(voids)):
         own = voids.labels == number + 1
-        alone = fill_voids(np.where(together, -1e30, truth), together, **options)
+        alone = fill_by_mcmd(np.where(together, -1e30, truth), together, **options)
         np.testing.assert_array_equal(alone.values[own], whole[own])
-    small = fill_voids(truth, together, max_size=6, **options).values
+    small = fill_by_mcmd(truth, together, max_size=6, **options).values
     np.testing.assert_array_equal(small[third], whole[third])
 
 
@@ -190,16 +193,16 @@ def test_a_tile_computes_what_the_mosaic_would(offset):
     truth = fractal(shape, seed=7).astype(np.float32)
     void = holed(shape, (90, 110, 120, 145), (70, 71, 90, 140), (150, 158, 160, 161))
     size = np.linspace(60, 70, shape[0]), np.full(shape[0], 90.0)
-    whole = fill_voids(truth, void, pixel_size=size).values
+    whole = fill_by_mcmd(truth, void, pixel_size=size).values
     row, column = offset
     cut = (slice(row, None), slice(column, None))
     lattice = Lattice(-row, -column, Lattice.covering(shape).levels)
-    part = fill_voids(
+    part = fill_by_mcmd(
         truth[cut], void[cut], pixel_size=(size[0][row:], size[1][row:]), lattice=lattice
     ).values
     np.testing.assert_array_equal(part, whole[cut])
     if offset == (13, 29):  # no multiples of the voids' coarsest steps
-        unaware = fill_voids(
+        unaware = fill_by_mcmd(
             truth[cut], void[cut], pixel_size=(size[0][row:], size[1][row:])
         ).values
         assert (unaware != whole[cut]).any()
@@ -213,10 +216,10 @@ def test_large_voids_are_filled_like_small_ones(monkeypatch, block, dtype):
     """
     truth = fractal(SHAPE, seed=8).astype(dtype)
     void = disc(SHAPE, (70, 80), 45) | holed(SHAPE, (0, 9, 0, 50), (150, 160, 100, 101))
-    small = fill_voids(truth, void).values
+    small = fill_by_mcmd(truth, void).values
     monkeypatch.setattr(relaxed, "_LARGE", 1)
     monkeypatch.setattr(relaxed, "_BLOCK", block)
-    large = fill_voids(truth, void).values
+    large = fill_by_mcmd(truth, void).values
     if block > void.sum() or dtype is np.float64:
         np.testing.assert_array_equal(large, small)
     else:
@@ -237,7 +240,7 @@ def test_islands_hold_the_surface(monkeypatch, large):
     known = np.zeros(truth.shape, bool)
     known[13::25, 7::25] = True
     filled, weighted = (
-        fill_voids(truth, ~known, variant=variant).values for variant in ("relaxed", "weighted")
+        fill_by_mcmd(truth, ~known, variant=variant).values for variant in ("relaxed", "weighted")
     )
     error, passes = (np.sqrt(((z - truth)[~known] ** 2).mean()) for z in (filled, weighted))
     assert error < 0.04 * np.ptp(truth)
@@ -253,7 +256,7 @@ def test_a_narrow_frame_holds_the_surface(margin):
     """All but the outermost cells unknown: a plane comes back within 3 % on all four sides."""
     truth = plane((203, 190))
     void = holed(truth.shape, (margin, 203 - margin, margin, 190 - margin))
-    filled = fill_voids(truth, void).values
+    filled = fill_by_mcmd(truth, void).values
     assert abs(filled - truth)[void].max() < 0.03 * np.ptp(truth)
 
 
@@ -263,7 +266,7 @@ def test_narrow_strips_hold_the_surface():
     void = np.zeros(truth.shape, bool)
     void[::2] = True
     void[1:-1, 0] = True
-    filled = fill_voids(truth, void).values
+    filled = fill_by_mcmd(truth, void).values
     assert np.sqrt(((filled - truth)[void] ** 2).mean()) < 0.004 * np.ptp(truth)
 
 
@@ -292,7 +295,7 @@ def test_narrow_strips_hold_the_surface():
 def test_overshoot_is_bounded(mask, bound):
     for seed in range(3):
         truth = fractal(SHAPE, seed=seed)
-        filled = fill_voids(np.where(mask, np.nan, truth)).values
+        filled = fill_by_mcmd(np.where(mask, np.nan, truth)).values
         assert np.isfinite(filled).all()
         relief = np.ptp(truth)
         known = truth[~mask]

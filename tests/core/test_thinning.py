@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import disc, fractal, plane
-from support import shared_data
+from support import fill_by_mcmd, shared_data
 
-import demsmith
 from demsmith.core import raster
 from demsmith.core.errors import Cancelled, InputError
 from demsmith.core.thinning import thin
@@ -19,7 +18,7 @@ every_detector = pytest.mark.parametrize("detector", DETECTORS)
 
 
 def rmse(truth, thinned, pixel_size=None):
-    rebuilt = demsmith.fill_voids(thinned.values, pixel_size=pixel_size, float_output=True).values
+    rebuilt = fill_by_mcmd(thinned.values, pixel_size=pixel_size, float_output=True).values
     return float(np.sqrt(((rebuilt - truth.astype(float))[~thinned.kept] ** 2).mean()))
 
 

@@ -11,13 +11,13 @@ from demsmith.core.errors import Cancelled, InputError
 from demsmith.core.mcmd.maps import Maps
 from demsmith.core.samples.options import SampleOptions
 from demsmith.core.tuning import tune_fill, tune_samples, tuning
+from demsmith.core.validation import errors_by_size, punch_voids
 from demsmith.core.voids import FillOptions, fill_voids
-from demsmith.core.voids.validation import errors_by_size, punch_voids
 
 CELL = 90.0
 SHAPE = (320, 360)
 NO_VOID = np.zeros(SHAPE, bool)
-TAUT = FillOptions(tension=CELL)
+TAUT = FillOptions(method="mcmd", tension=CELL)
 CURVED = FillOptions(variant="weighted", l=2.0, l_bu=10.0)
 
 
@@ -54,7 +54,7 @@ def test_the_known_best_is_found(tuned):
 
 
 def test_the_opposite_is_found_on_the_opposite_ground():
-    tuned = tune(white_noise(), FillOptions(tension=100 * CELL))
+    tuned = tune(white_noise(), FillOptions(method="mcmd", tension=100 * CELL))
     assert tuned.accepted and tuned.parameters["tension"][1] < 2 * CELL
     assert tuned.gain > 2 * tuned.noise > 0
 
@@ -108,7 +108,7 @@ def test_what_lies_in_voids_has_no_say():
 def test_a_worse_find_is_refused(monkeypatch):
     """Were the search to come back with nonsense, the options stay."""
     monkeypatch.setattr(tuning, "search", lambda *_, **__: {"tension": CELL})
-    options = FillOptions(tension=100 * CELL)
+    options = FillOptions(method="mcmd", tension=100 * CELL)
     tuned = tune(smooth(), options)
     assert not tuned.accepted and tuned.options is options
     assert tuned.parameters == {"tension": (100 * CELL, 100 * CELL)}

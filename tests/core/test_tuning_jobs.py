@@ -15,7 +15,7 @@ from demsmith.core.samples import SampleOptions, from_samples, samples_file
 from demsmith.core.voids import FillOptions, fill_file, fill_voids
 
 SHAPE = (320, 360)
-TAUT = FillOptions(tension=90.0, tune=True)
+TAUT = FillOptions(method="mcmd", tension=90.0, tune=True)
 CURVED = {"variant": "weighted", "l": 2.0, "l_bu": 10.0, "tune": True}
 VOID = holed(SHAPE, (100, 130, 140, 180))
 
@@ -41,6 +41,16 @@ def test_a_tuned_fill_is_the_fill_with_the_tuned_options(ground):
     plain = fill_voids(ground, VOID, options=replace(TAUT, tune=False), pixel_size=90).values
     error = [np.abs(values - ground)[VOID].mean() for values in (filled.values, plain)]
     assert error[0] < error[1]
+
+
+def test_tuning_is_of_mcmd_whatever_the_method(ground):
+    auto, mcmd = (
+        fill_voids(ground, VOID, options=replace(TAUT, method=method), pixel_size=90)
+        for method in ("auto", "mcmd")
+    )
+    assert auto.tuned.parameters == mcmd.tuned.parameters
+    np.testing.assert_array_equal(auto.values, mcmd.values)
+    assert auto.sigma is None
 
 
 def test_without_voids_there_is_nothing_to_tune(ground):

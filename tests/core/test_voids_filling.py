@@ -1,5 +1,6 @@
 """What holds of every fill: known cells, types, layouts, threads, progress, refusals."""
 
+import contextlib
 import itertools
 import threading
 import time
@@ -11,9 +12,18 @@ from hypothesis import strategies as st
 from scenes import disc, fractal, holed, plane
 
 from demsmith.core.errors import Cancelled, InputError
+from demsmith.core.mcmd import Maps
+from demsmith.core.options import specifications
 from demsmith.core.voids import FILLED, LEFT, ORIGINAL, FillOptions, fill_voids, find_voids
+from demsmith.core.voids.accurate import SOURCE_OF_METHOD
 
 VARIANTS = ("relaxed", "weighted", "paper")
+ENGINES = {
+    "accurate": {}, "relaxed": dict(method="mcmd"), "weighted": dict(variant="weighted"),
+    "paper": dict(variant="paper"),
+}  # fmt: skip
+every_engine = pytest.mark.parametrize("engine", ENGINES)
+every_method = pytest.mark.parametrize("method", ["auto", "mcmd"])
 SCHEMES = ("triangle-edge", "diamond-square")
 DTYPES = (
     "int8", "uint8", "int16", ">i2", "uint16", "int32", ">i4", "uint32", "int64", "uint64",
@@ -56,18 +66,19 @@ def rasters(draw):
 
 
 @given(
-    rasters(), st.sampled_from(VARIANTS), st.sampled_from(SCHEMES), st.sampled_from([0.0, 0.3]),
-    st.sampled_from(LAYOUTS), st.booleans(),
+    rasters(), st.sampled_from(sorted(ENGINES)), st.sampled_from(SCHEMES),
+    st.sampled_from([0.0, 0.3]), st.sampled_from(LAYOUTS), st.booleans(),
 )  # fmt: skip
 def test_every_void_is_filled_and_no_known_cell_changed(
-    raster, variant, scheme, r_s, layout, float_output
+    raster, engine, scheme, r_s, layout, float_output
 ):
     values, void = raster
     given_ = laid_out(values, layout)
+    own = {} if engine == "accurate" else dict(scheme=scheme, r_s=r_s)
     before, void_before = values.tobytes(), void.tobytes()
     filled = fill_voids(
-        given_, laid_out(void, layout), variant=variant, scheme=scheme, r_s=r_s,
-        float_output=float_output, pixel_size=(30.0, 31.0),
+        given_, laid_out(void, layout), float_output=float_output, pixel_size=(30.0, 31.0),
+        **ENGINES[engine], **own,
     )  # fmt: skip
     assert np.ascontiguousarray(given_).tobytes() == before == values.tobytes()
     assert void.tobytes() == void_before
@@ -80,53 +91,64 @@ def test_every_void_is_filled_and_no_known_cell_changed(
         assert out[~void].tobytes() == values[~void].tobytes()
     assert np.isfinite(out.astype(np.float64)).all()
     assert filled.cells_filled == void.sum()
-    np.testing.assert_array_equal(filled.source(), np.where(void, FILLED, ORIGINAL))
     assert not filled.left().any()
-    if r_s == 0 and variant != "relaxed":
+    source = filled.source()
+    if engine == "accurate":
+        assert np.isin(source[void], SOURCE_OF_METHOD).all()
+        np.testing.assert_array_equal(filled.sigma > 0, void)
+    else:
+        assert (source[void] == FILLED).all() and filled.sigma is None
+    assert (source[~void] == ORIGINAL).all()
+    if r_s == 0 and engine in ("weighted", "paper"):
         # Means of known cells: nothing beyond them.
         known = values[~void].astype(np.float64)
         assert out[void].min() >= known.min() - 1e-3 and out[void].max() <= known.max() + 1e-3
 
 
+@every_method
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("dtype", ["int16", ">i2", "float32", ">f4", "float64", ">f8"])
-def test_layout_and_byte_order_do_not_matter(dtype, layout):
+def test_layout_and_byte_order_do_not_matter(dtype, layout, method):
     truth, void = fractal((40, 50)).astype(dtype), disc((40, 50), (20, 20), 9)
-    plain = fill_voids(truth.astype(np.dtype(dtype).newbyteorder("=")), void).values
-    other = fill_voids(laid_out(truth, layout), laid_out(void, layout)).values
+    native = truth.astype(np.dtype(dtype).newbyteorder("="))
+    plain = fill_voids(native, void, method=method).values
+    other = fill_voids(laid_out(truth, layout), laid_out(void, layout), method=method).values
     np.testing.assert_array_equal(other, plain)
 
 
-def test_integers_are_rounded_to_the_nearest():
+@every_method
+def test_integers_are_rounded_to_the_nearest(method):
     truth, void = fractal((60, 60)), disc((60, 60), (30, 30), 12)
     whole = np.rint(truth).astype(np.int16)
-    in_float = fill_voids(whole, void, float_output=True).values
-    in_int = fill_voids(whole, void).values
+    in_float = fill_voids(whole, void, method=method, float_output=True).values
+    in_int = fill_voids(whole, void, method=method).values
     np.testing.assert_array_equal(in_int, np.rint(in_float).astype(np.int16))
     assert (in_float[void] != np.rint(in_float[void])).any()
 
 
+@every_method
 @pytest.mark.parametrize(("dtype", "top"), [("uint8", 255), ("int8", 127), ("int16", 32767)])
-def test_overshoot_stops_at_the_types_limits(dtype, top):
-    """A slope that ends at the limit would go on beyond it, and wrap around to the other end."""
-    ground = plane((40, 40), slope=(0, 4.0), height=0)
-    ground = np.minimum(ground - ground[0, 19] + top, top)
-    ground = np.maximum(ground, np.iinfo(dtype).min).astype(dtype)
-    void = holed((40, 40), (8, 32, 19, 33))
-    real = fill_voids(ground.astype(np.float64), void).values
+def test_overshoot_stops_at_the_types_limits(dtype, top, method):
+    """A dome that rises beyond the limit must not wrap around to the other end."""
+    row, column = np.indices((40, 40)) - 20
+    dome = top + 30 - 0.3 * (row**2 + column**2)
+    void = holed(dome.shape, (9, 32, 9, 32))
+    ground = np.maximum(np.where(void, 0, dome), np.iinfo(dtype).min).astype(dtype)
+    real = fill_voids(ground.astype(np.float64), void, method=method).values
     assert real[void].max() > top + 1
-    filled = fill_voids(ground, void).values
+    filled = fill_voids(ground, void, method=method).values
     np.testing.assert_array_equal(filled[void], np.rint(np.minimum(real, top)).astype(dtype)[void])
 
 
 # --- where voids come from -----------------------------------------------------------------------
 
 
-def test_nan_and_infinity_are_voids():
+@every_method
+def test_nan_and_infinity_are_voids(method):
     truth = plane((30, 30))
     values = truth.copy()
     values[4:7, 5:9], values[20, 20], values[21, 20] = np.nan, np.inf, -np.inf
-    filled = fill_voids(values)
+    filled = fill_voids(values, method=method)
     assert filled.cells_filled == 14
     assert abs(filled.values - truth).max() < 0.5
 
@@ -148,28 +170,29 @@ def test_integers_without_a_mask_have_no_voids():
     np.testing.assert_array_equal(filled.values, np.arange(12).reshape(3, 4))
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_what_lies_in_a_void_does_not_matter(variant):
+@pytest.mark.parametrize("r_s", [0.0, 0.1])
+@every_engine
+def test_what_lies_in_a_void_does_not_matter(engine, r_s):
     truth, void = fractal((40, 50)), disc((40, 50), (20, 20), 9)
-    plain = fill_voids(truth, void, variant=variant, r_s=0.1).values
+    plain = fill_voids(truth, void, r_s=r_s, **ENGINES[engine]).values
     for rubbish in (np.nan, -3.4e38, np.inf):
         spoilt = np.where(void, rubbish, truth)
-        again = fill_voids(spoilt, void, variant=variant, r_s=0.1).values
+        again = fill_voids(spoilt, void, r_s=r_s, **ENGINES[engine]).values
         np.testing.assert_array_equal(again, plain)
 
 
 # --- which voids, and where to -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
+@every_engine
 @pytest.mark.parametrize("dtype", ["int16", "float32"])
-def test_selection(variant, dtype):
+def test_selection(engine, dtype):
     truth = fractal((60, 60)).astype(dtype)
     edge, small, large = (
         holed((60, 60), box) for box in ((0, 3, 10, 12), (20, 22, 20, 23), (40, 50, 30, 44))
     )
     values = np.where(edge | small | large, np.asarray(-5, dtype), truth)
-    every = fill_voids(values, edge | small | large, variant=variant).values
+    every = fill_voids(values, edge | small | large, **ENGINES[engine])
     cases = {
         (): edge | small | large,
         (("interior_only", True),): small | large,
@@ -178,27 +201,28 @@ def test_selection(variant, dtype):
         (("interior_only", True), ("max_size", 6)): small,
     }
     for options, wanted in cases.items():
-        filled = fill_voids(values, edge | small | large, variant=variant, **dict(options))
-        np.testing.assert_array_equal(filled.values, np.where(wanted, every, values))
+        filled = fill_voids(values, edge | small | large, **ENGINES[engine], **dict(options))
+        np.testing.assert_array_equal(filled.values, np.where(wanted, every.values, values))
         np.testing.assert_array_equal(
             filled.source(),
-            np.select([wanted, edge | small | large], [FILLED, LEFT], ORIGINAL),
+            np.where(wanted | (every.source() == ORIGINAL), every.source(), LEFT),
         )
         np.testing.assert_array_equal(filled.left(), (edge | small | large) & ~wanted)
         assert filled.cells_filled == wanted.sum()
 
 
+@every_method
 @pytest.mark.parametrize("layout", ["C", "fortran", "steps", "reversed"])
 @pytest.mark.parametrize("dtype", ["int16", "float32", ">f4", "float64"])
-def test_in_place_and_into_another_array(dtype, layout):
+def test_in_place_and_into_another_array(dtype, layout, method):
     truth, void = fractal((40, 50)).astype(dtype), disc((40, 50), (20, 20), 9)
-    expected = fill_voids(truth, void).values
+    expected = fill_voids(truth, void, method=method).values
     values = laid_out(truth.copy(), layout)
-    assert fill_voids(values, void, out=values).values is values
+    assert fill_voids(values, void, method=method, out=values).values is values
     np.testing.assert_array_equal(values, expected)
     target = laid_out(np.zeros_like(truth), layout)
     source = truth.copy()
-    assert fill_voids(source, void, out=target).values is target
+    assert fill_voids(source, void, method=method, out=target).values is target
     np.testing.assert_array_equal(target, expected)
     np.testing.assert_array_equal(source, truth)
 
@@ -212,10 +236,9 @@ def test_same_bytes_whatever_the_threads(variant, scheme, r_s):
     rng = np.random.default_rng(1)
     truth = fractal((300, 310)).astype(np.float32)
     void = (rng.random(truth.shape) < 0.1) | disc(truth.shape, (150, 150), 60)
+    options = dict(method="mcmd", variant=variant, scheme=scheme, r_s=r_s, seed=5)
     fills = {
-        fill_voids(
-            truth, void, variant=variant, scheme=scheme, r_s=r_s, seed=5, threads=threads
-        ).values.tobytes()
+        fill_voids(truth, void, threads=threads, **options).values.tobytes()
         for threads in (1, 2, 5, None, 1)
     }
     assert len(fills) == 1
@@ -232,13 +255,24 @@ def test_wide_levels_are_cut_into_blocks_without_a_trace(monkeypatch):
         np.testing.assert_array_equal(one, four)
 
 
-def test_calls_from_many_threads():
+def test_same_bytes_whatever_the_threads_learned_or_not():
+    truth = fractal((200, 210)).astype(np.float32)
+    void = (np.random.default_rng(1).random(truth.shape) < 0.03) | disc(truth.shape, (90, 90), 20)
+    one, *others = (fill_voids(truth, void, threads=threads) for threads in (1, 2, 5))
+    for other in others:
+        assert other.values.tobytes() == one.values.tobytes()
+        assert other.sigma.tobytes() == one.sigma.tobytes()
+        np.testing.assert_array_equal(other.choices.error, one.choices.error)
+
+
+@every_method
+def test_calls_from_many_threads(method):
     truth, void = fractal((80, 80)), disc((80, 80), (40, 40), 20)
-    expected = fill_voids(truth, void).values
+    expected = fill_voids(truth, void, method=method).values
     results = [None] * 4
 
     def work(n):
-        results[n] = fill_voids(truth, void, threads=2).values
+        results[n] = fill_voids(truth, void, method=method, threads=2).values
 
     workers = [threading.Thread(target=work, args=(n,)) for n in range(4)]
     for worker in workers:
@@ -287,11 +321,53 @@ def test_progress_rises_from_0_to_1(variant, case, threads, r_s):
     truth = fractal((800, 800)).astype(np.float32)
     void = CASES[case](truth.shape)
     show = Recorder()
-    fill_voids(truth, void, variant=variant, threads=threads, progress=show, r_s=r_s)
+    fill_voids(truth, void, method="mcmd", variant=variant, threads=threads, progress=show, r_s=r_s)
+    assert_progress_rises(show)
+
+
+def assert_progress_rises(show):
     assert len(show.fractions) >= 5
     assert (np.diff(show.fractions) >= 0).all()
     assert 0 <= show.fractions[0] < 0.6
     assert 0.8 < show.fractions[-1] <= 1
+
+
+SMALLER_CASES = {  # than MCMD's, for learning and estimating take longer
+    "many small": lambda: np.random.default_rng(0).random((400, 400)) < 0.1,
+    "one large": lambda: disc((400, 400), (200, 200), 45),
+    "all but few": lambda: np.random.default_rng(0).random((150, 150)) < 0.95,
+}
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("case", SMALLER_CASES)
+def test_progress_of_the_accurate_engine(case, threads):
+    void = SMALLER_CASES[case]()
+    show = Recorder()
+    fill_voids(fractal(void.shape).astype(np.float32), void, threads=threads, progress=show)
+    assert_progress_rises(show)
+
+
+@pytest.mark.parametrize("after", [0.0, 0.2, 0.5, 1.0])
+@pytest.mark.parametrize("case", SMALLER_CASES)
+def test_cancel_of_the_accurate_engine_is_prompt(case, after):
+    """At any time, also while a single large void is worked on."""
+    void = SMALLER_CASES[case]()
+    truth = fractal(void.shape).astype(np.float32)
+    fill_voids(truth, void & disc(void.shape, (75, 75), 30))  # compiles
+    before, begin = truth.copy(), time.perf_counter()
+
+    class Impatient:
+        def report(self, fraction):
+            pass
+
+        def cancelled(self):
+            return time.perf_counter() - begin > after
+
+    with contextlib.suppress(Cancelled):  # or it was done before
+        fill_voids(truth, void, threads=2, progress=Impatient())
+    assert time.perf_counter() - begin < after + 1
+    np.testing.assert_array_equal(truth, before)
 
 
 @pytest.mark.parametrize("stop_at", [0.0, 0.4])
@@ -301,10 +377,11 @@ def test_progress_rises_from_0_to_1(variant, case, threads, r_s):
 def test_cancel_is_prompt(variant, case, threads, stop_at):
     truth = fractal((800, 800)).astype(np.float32)
     void = CASES[case](truth.shape)
-    fill_voids(truth[:50, :50], void[:50, :50] | (truth[:50, :50] < 0), variant=variant)
+    options = dict(method="mcmd", variant=variant)
+    fill_voids(truth[:50, :50], void[:50, :50] | (truth[:50, :50] < 0), **options)
     show, before = Recorder(stop_at), truth.copy()
     with pytest.raises(Cancelled):
-        fill_voids(truth, void, variant=variant, threads=threads, progress=show)
+        fill_voids(truth, void, threads=threads, progress=show, **options)
     assert time.perf_counter() - show.asked < 0.5
     assert max(show.fractions, default=0) < 0.95
     np.testing.assert_array_equal(truth, before)
@@ -374,6 +451,46 @@ def test_d_max_has_an_effect():
         fill_voids(truth, void, variant="paper", l=1.0, d_max=d).values for d in (30.0, 3000.0)
     )
     assert near[void].mean() < far[void].mean() - 1
+
+
+OTHERWISE = dict(
+    variant="weighted", scheme="triangle-edge", l=1.0, l_bu=1.0, datum=10.0, h=0.3, r_s=0.1,
+    r_t=0.2, relief=50.0,
+)  # fmt: skip
+
+
+def test_every_option_of_mcmd_is_met_here_but_those_of_both_engines():
+    own = {spec.name for spec in specifications(FillOptions) if spec.advanced}
+    assert own == {*OTHERWISE, "tension", "seed"}
+
+
+@pytest.mark.parametrize("name", OTHERWISE)
+def test_auto_hands_over_to_mcmd_where_mcmds_own_options_are_set(name):
+    needs = dict(variant="weighted") if name in ("l", "l_bu", "datum") else {}
+    options = {**needs, name: OTHERWISE[name]}
+    truth, void = fractal((40, 50)) + 100, disc((40, 50), (20, 20), 9)
+    auto, mcmd = (fill_voids(truth, void, method=m, **options) for m in ("auto", "mcmd"))
+    np.testing.assert_array_equal(auto.values, mcmd.values)
+    assert auto.sigma is None and auto.choices is None and auto.model is None
+    assert (auto.source()[void] == FILLED).all()
+
+
+def test_auto_hands_over_to_mcmd_where_maps_are_given():
+    truth, void = fractal((40, 50)), disc((40, 50), (20, 20), 9)
+    maps = Maps(r_s=np.full(truth.shape, 0.1))
+    auto, mcmd = (fill_voids(truth, void, method=m, maps=maps) for m in ("auto", "mcmd"))
+    np.testing.assert_array_equal(auto.values, mcmd.values)
+    assert auto.sigma is None
+
+
+def test_tension_and_seed_are_options_of_both_engines():
+    truth, void = fractal((40, 50)), disc((40, 50), (20, 20), 9)
+    plain, seeded, taut = (
+        fill_voids(truth, void, **options) for options in ({}, dict(seed=3), dict(tension=2.0))
+    )
+    assert taut.sigma is not None
+    np.testing.assert_array_equal(seeded.values, plain.values)
+    assert (taut.values != plain.values)[void].any()
 
 
 def test_voids_of_a_fill_are_found_voids():

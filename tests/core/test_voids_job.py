@@ -11,7 +11,8 @@ from support import WGS84_3ARC, digest, make_raster
 
 from demsmith.core import raster
 from demsmith.core.errors import Cancelled, InputError, OutputError
-from demsmith.core.voids import FillOptions, fill_file, fill_voids, job
+from demsmith.core.voids import FILLED, FillOptions, fill_file, fill_voids, job
+from demsmith.core.voids.accurate import SOURCE_OF_METHOD
 
 gdal = pytest.importorskip("osgeo.gdal", reason="GDAL is missing")
 
@@ -27,6 +28,20 @@ def tile(path, *, dtype="int16", nodata=-32768, ground=None, void=VOID, **option
     return make_raster(path, values, nodata=nodata, **options)
 
 
+every_method = pytest.mark.parametrize("method", ["auto", "mcmd"])
+
+
+def source_map_is(path, filled, left, method):
+    """Whether a source map tells these cells filled by the method, those left, the rest known."""
+    codes = stored(path)[0]
+    by = [FILLED] if method == "mcmd" else SOURCE_OF_METHOD
+    inside = filled & ~left
+    return (
+        np.isin(codes[inside], by).all() and (codes[left] == 2).all()
+        and (codes[~(filled | left)] == 0).all()
+    )  # fmt: skip
+
+
 def stored(path):
     """Values, void cells by GDAL's own mask, nodata tag."""
     dataset = gdal.Open(str(path))
@@ -37,13 +52,16 @@ def stored(path):
 # --- values --------------------------------------------------------------------------------------
 
 
-def test_fill_as_the_array_function_does(tmp_path):
+@every_method
+def test_fill_as_the_array_function_does(tmp_path, method):
     source = tile(tmp_path / "in.tif")
     before = digest(source)
-    result = fill_file(source, tmp_path / "out.tif")
+    result = fill_file(source, tmp_path / "out.tif", options=FillOptions(method=method))
     assert digest(source) == before
     read = raster.read(source)
-    expected = fill_voids(read.values, read.void, pixel_size=read.grid.pixel_size_m()).values
+    expected = fill_voids(
+        read.values, read.void, method=method, pixel_size=read.grid.pixel_size_m()
+    ).values
     values, void, nodata = stored(tmp_path / "out.tif")
     assert values.dtype == np.int16 and nodata == -32768
     np.testing.assert_array_equal(values, expected)
@@ -51,8 +69,9 @@ def test_fill_as_the_array_function_does(tmp_path):
     assert (result.voids, result.cells, result.largest_void) == (3, 4800, 253)
     assert (result.cells_void, result.cells_filled, result.cells_unfilled) == (273, 273, 0)
     assert result.output == str(tmp_path / "out.tif")
-    assert result.source_map is None and result.report is None
+    assert result.source_map is None and result.uncertainty is None and result.report is None
     assert result.warnings == ()
+    assert len(result.reasons) == (4 if method == "auto" else 0)
 
 
 @pytest.mark.parametrize("driver", ["GTiff", "SRTMHGT", "AAIGrid", "ENVI"])
@@ -89,11 +108,12 @@ def test_type_kept_or_float(tmp_path, dtype):
     np.testing.assert_array_equal(same[~VOID], ground.astype(dtype)[~VOID])
 
 
-def test_bytes_do_not_wrap_around(tmp_path):
+@every_method
+def test_bytes_do_not_wrap_around(tmp_path, method):
     void = holed(SHAPE, (10, 40, 44, 60))
     ground = np.clip(plane(SHAPE, slope=(0, 5.0), height=40), 1, 255)
     source = tile(tmp_path / "in.tif", dtype="uint8", nodata=0, ground=ground, void=void)
-    fill_file(source, tmp_path / "out.tif")
+    fill_file(source, tmp_path / "out.tif", options=FillOptions(method=method))
     values, left, _ = stored(tmp_path / "out.tif")
     assert not left.any()
     assert values[void].min() > 200
@@ -102,12 +122,13 @@ def test_bytes_do_not_wrap_around(tmp_path):
 # --- nodata tags ---------------------------------------------------------------------------------
 
 
-def test_filled_ground_at_the_tags_value_is_ground(tmp_path):
+@every_method
+def test_filled_ground_at_the_tags_value_is_ground(tmp_path, method):
     """Tag 0 on ground that crosses 0: the filled 0 must not read as a void."""
     ground = np.rint(plane(SHAPE, slope=(0, 1.0), height=-30))
     ground[ground == 0] = 1
     source = tile(tmp_path / "in.tif", nodata=0, ground=ground)
-    result = fill_file(source, tmp_path / "out.tif")
+    result = fill_file(source, tmp_path / "out.tif", options=FillOptions(method=method))
     values, void, _ = stored(tmp_path / "out.tif")
     assert not void.any() and result.cells_unfilled == 0
     again = raster.read(tmp_path / "out.tif")
@@ -115,25 +136,25 @@ def test_filled_ground_at_the_tags_value_is_ground(tmp_path):
     assert (values[VOID] == 0).any()
 
 
-def test_voids_left_are_tagged_whatever_their_tag(tmp_path):
+@every_method
+def test_voids_left_are_tagged_whatever_their_tag(tmp_path, method):
     """A voids' tag that a filled cell would take gives way to another."""
     ground = np.rint(plane(SHAPE, slope=(0, 1.0), height=-30))
     ground[ground == 0] = 1
     source = tile(tmp_path / "in.tif", nodata=0, ground=ground)
     result = fill_file(
         source, tmp_path / "out.tif", source_map=tmp_path / "map.tif",
-        options=FillOptions(interior_only=True),
+        options=FillOptions(method=method, interior_only=True),
     )  # fmt: skip
     values, void, nodata = stored(tmp_path / "out.tif")
     edge = holed(SHAPE, (0, 3, 70, 76))
     np.testing.assert_array_equal(void, edge)
     assert (values[VOID & ~edge] == 0).any() and nodata != 0
     assert (result.cells_filled, result.cells_unfilled) == (255, 18)
-    np.testing.assert_array_equal(
-        stored(tmp_path / "map.tif")[0], np.select([edge, VOID], [2, 1], 0)
-    )
+    assert source_map_is(tmp_path / "map.tif", VOID, edge, method)
 
 
+@every_method
 @pytest.mark.parametrize(
     ("options", "kept"),
     [
@@ -142,18 +163,18 @@ def test_voids_left_are_tagged_whatever_their_tag(tmp_path):
         (dict(interior_only=True, max_size=100), VOID & ~holed(SHAPE, (50, 52, 60, 61))),
     ],
 )
-def test_voids_left_stay_nodata(tmp_path, options, kept):
+def test_voids_left_stay_nodata(tmp_path, options, kept, method):
     source = tile(tmp_path / "in.tif")
     result = fill_file(
         source, tmp_path / "out.tif", source_map=tmp_path / "map.tif",
-        options=FillOptions(**options),
+        options=FillOptions(method=method, **options),
     )  # fmt: skip
     values, void, nodata = stored(tmp_path / "out.tif")
     assert nodata == -32768
     np.testing.assert_array_equal(void, kept)
     assert (values[kept] == -32768).all()
     source_map, unknown, tag = stored(tmp_path / "map.tif")
-    np.testing.assert_array_equal(source_map, np.select([kept, VOID], [2, 1], 0))
+    assert source_map_is(tmp_path / "map.tif", VOID, kept, method)
     assert source_map.dtype == np.uint8 and tag is None and not unknown.any()
     assert result.cells_unfilled == kept.sum()
     assert [row["filled"] for row in result.table.rows()].count(False) >= 1
@@ -197,6 +218,7 @@ def test_scaled_rasters_mean_the_same(tmp_path):
     deci = tile(tmp_path / "dm.tif", ground=np.rint((real - 100) * 10), nodata=-32768, setup=scaled)
     for options in (
         FillOptions(),
+        FillOptions(method="mcmd"),
         FillOptions(variant="paper", l=1.0, l_bu=3.0, datum=90.0),
         FillOptions(variant="weighted", r_s=0.2, relief=40.0, seed=3),
         FillOptions(r_s=0.2, seed=3),
@@ -285,8 +307,11 @@ def test_report_is_json_with_all_that_matters(tmp_path):
     assert [row["cells"] for row in report["void_table"]] == [18, 253, 2]
     assert set(report["void_table"][0]) == {
         "id", "row", "column", "x", "y", "cells", "area_m2", "rim_low", "rim_mean", "rim_high",
-        "rim_relief", "touches_edge", "filled", "roughness_h", "roughness",
+        "rim_relief", "touches_edge", "filled", "roughness_h", "roughness", "method",
+        "expected_error", "reason",
     }  # fmt: skip
+    assert report["uncertainty"] is None and report["options"]["method"] == "auto"
+    assert report["reasons"] == list(result.reasons)
     json.dumps(result.as_dict(), allow_nan=False)
 
 
@@ -301,13 +326,14 @@ def test_no_voids_is_said_and_copied(tmp_path):
 
 # --- all or nothing ------------------------------------------------------------------------------
 
-OUTPUTS = ("out.tif", "map.tif", "report.json")
+OUTPUTS = ("out.tif", "map.tif", "sigma.tif", "report.json")
 
 
 def outputs(folder):
     return dict(
-        output=folder / "out.tif", source_map=folder / "map.tif", report=folder / "report.json"
-    )
+        output=folder / "out.tif", source_map=folder / "map.tif", uncertainty=folder / "sigma.tif",
+        report=folder / "report.json",
+    )  # fmt: skip
 
 
 def listing(folder):
@@ -328,7 +354,9 @@ def fail_at(monkeypatch, module, name, call):
 
 
 @pytest.mark.parametrize("older", [False, True])
-@pytest.mark.parametrize("where", ["write 1", "write 2", "report", "cancel", "creation option"])
+@pytest.mark.parametrize(
+    "where", ["write 1", "write 2", "write 3", "report", "cancel", "creation option"]
+)
 def test_all_outputs_or_none(tmp_path, monkeypatch, where, older):
     source = tile(tmp_path / "in.tif")
     folder = tmp_path / "out"
@@ -382,14 +410,23 @@ def test_nothing_is_overwritten_unasked(tmp_path, taken):
         (dict(report="in.tif"), "is an input"),
         (dict(source_map="out.tif"), "different files"),
         (dict(report="map.tif"), "different files"),
+        (dict(uncertainty="in.tif"), "is an input"),
+        (dict(uncertainty="map.tif"), "different files"),
+        (dict(uncertainty="missing/s.tif"), "no folder"),
+        (dict(options=FillOptions(method="mcmd")), "an uncertainty needs the method auto"),
+        (dict(options=FillOptions(r_s=0.1)), "an uncertainty needs the method auto"),
+        (dict(options=FillOptions(tune=True)), "an uncertainty needs the method auto"),
         (dict(output="out.png"), "must be a GeoTIFF"),
         (dict(output="missing/out.tif"), "no folder"),
         (dict(report="missing/r.json"), "no folder"),
         (dict(band=2), "band"),
         (dict(threads=0), "threads"),
         (dict(options=FillOptions(h=7)), "h is 7"),
-        (dict(options=FillOptions(l=1.0)), "relaxed"),
-        (dict(options=FillOptions(variant="paper", datum=1e5)), r"in\.tif.*datum"),
+        (dict(options=FillOptions(l=1.0), uncertainty=None), "relaxed"),
+        (
+            dict(options=FillOptions(variant="paper", datum=1e5), uncertainty=None),
+            r"in\.tif.*datum",
+        ),
     ],
 )
 def test_refused_without_a_trace(tmp_path, changes, message):
@@ -397,7 +434,7 @@ def test_refused_without_a_trace(tmp_path, changes, message):
     before = listing(tmp_path)
     asked = outputs(tmp_path)
     for name, value in changes.items():
-        asked[name] = tmp_path / value if name in ("output", "source_map", "report") else value
+        asked[name] = tmp_path / value if name in asked and value else value
     with pytest.raises((InputError, OutputError), match=message):
         fill_file(source, **asked, overwrite=True)
     assert listing(tmp_path) == before
@@ -425,13 +462,87 @@ def test_progress_of_the_whole_job(tmp_path):
     assert fractions[0] >= 0 and fractions[-1] == 1
 
 
-@pytest.mark.parametrize("variant", ["relaxed", "paper"])
-def test_outputs_do_not_depend_on_threads(tmp_path, variant):
+@pytest.mark.parametrize(
+    "options", [{}, dict(variant="relaxed", r_s=0.1), dict(variant="paper", r_s=0.1)]
+)
+def test_outputs_do_not_depend_on_threads(tmp_path, options):
     source = tile(tmp_path / "in.tif")
+    names = ("output", "source_map") if options else ("output", "source_map", "uncertainty")
     for threads in (1, 2, 5):
-        fill_file(
-            source, tmp_path / f"{threads}.tif", source_map=tmp_path / f"{threads}map.tif",
-            threads=threads, options=FillOptions(variant=variant, r_s=0.1),
-        )  # fmt: skip
-    assert len({digest(tmp_path / f"{threads}.tif") for threads in (1, 2, 5)}) == 1
-    assert len({digest(tmp_path / f"{threads}map.tif") for threads in (1, 2, 5)}) == 1
+        paths = {name: tmp_path / f"{threads}{name}.tif" for name in names}
+        fill_file(source, **paths, threads=threads, options=FillOptions(**options))
+    for name in names:
+        assert len({digest(tmp_path / f"{threads}{name}.tif") for threads in (1, 2, 5)}) == 1
+
+
+# --- uncertainty ---------------------------------------------------------------------------------
+
+
+def test_uncertainty_is_of_the_filled_cells(tmp_path):
+    source = tile(tmp_path / "in.tif")
+    result = fill_file(
+        source, tmp_path / "out.tif", uncertainty=tmp_path / "sigma.tif",
+        options=FillOptions(max_size=100),
+    )  # fmt: skip
+    assert result.uncertainty == str(tmp_path / "sigma.tif")
+    sigma, unknown, nodata = stored(tmp_path / "sigma.tif")
+    left = disc(SHAPE, (30, 30), 9)
+    assert sigma.dtype == np.float32 and nodata == -1
+    np.testing.assert_array_equal(unknown, left)
+    assert (sigma[left] == -1).all() and (sigma[VOID & ~left] > 0).all()
+    assert (sigma[~VOID] == 0).all()
+    read = raster.read(source)
+    filled = fill_voids(
+        read.values, read.void, max_size=100, pixel_size=read.grid.pixel_size_m()
+    )  # fmt: skip
+    np.testing.assert_array_equal(sigma[~left], filled.sigma[~left])
+
+
+def test_uncertainty_and_table_speak_the_rasters_unit(tmp_path):
+    """Decimetres stored, metres told: sigma and expected errors as of the same ground in metres."""
+    real = np.rint(fractal(SHAPE)) / 10 + 100
+
+    def scaled(dataset):
+        dataset.GetRasterBand(1).SetScale(0.1)
+        dataset.GetRasterBand(1).SetOffset(100.0)
+
+    metres = tile(tmp_path / "m.tif", dtype="float64", nodata=-9999, ground=real)
+    deci = tile(tmp_path / "dm.tif", ground=np.rint((real - 100) * 10), setup=scaled)
+    one, other = (
+        fill_file(path, f"{path}.out.tif", uncertainty=f"{path}.sigma.tif")
+        for path in (metres, deci)
+    )
+    a, b = (stored(result.uncertainty)[0] for result in (one, other))
+    np.testing.assert_allclose(b[VOID], a[VOID], rtol=0.02)
+    np.testing.assert_allclose(other.table.expected_error, one.table.expected_error, rtol=0.02)
+    assert one.table.expected_error == pytest.approx(
+        [np.sqrt((a[own].astype(float) ** 2).mean()) for own in (
+            holed(SHAPE, (0, 3, 70, 76)), disc(SHAPE, (30, 30), 9), holed(SHAPE, (50, 52, 60, 61))
+        )], rel=1e-5,
+    )  # fmt: skip
+
+
+def test_table_tells_method_and_reason(tmp_path):
+    source = tile(tmp_path / "in.tif")
+    table = fill_file(source, tmp_path / "a.tif", options=FillOptions(max_size=100)).table
+    assert table.method[1] == "" and table.reason[1] == "" and np.isnan(table.expected_error[1])
+    for n in (0, 2):
+        assert table.method[n].startswith("interpolated ")
+        assert "%" in table.reason[n] and table.expected_error[n] > 0
+    table = fill_file(source, tmp_path / "b.tif", options=FillOptions(method="mcmd")).table
+    assert set(table.method) == {"interpolated by MCMD"} and set(table.reason) == {""}
+    assert np.isnan(table.expected_error).all()
+
+
+def test_uncertainty_without_voids_is_none(tmp_path):
+    source = make_raster(tmp_path / "in.tif", fractal(SHAPE).astype(np.float32))
+    result = fill_file(source, tmp_path / "out.tif", uncertainty=tmp_path / "sigma.tif")
+    assert not stored(tmp_path / "sigma.tif")[0].any()
+    assert result.reasons == ()
+
+
+def test_uncertainty_beside_maps_is_refused(tmp_path):
+    source = tile(tmp_path / "in.tif")
+    rough = make_raster(tmp_path / "rough.tif", np.full(SHAPE, 0.1, np.float32))
+    with pytest.raises(InputError, match="an uncertainty needs the method auto"):
+        fill_file(source, tmp_path / "out.tif", uncertainty=tmp_path / "s.tif", maps={"r_s": rough})

@@ -28,6 +28,9 @@ RAW = [
 ]
 
 
+every_method = pytest.mark.parametrize("method", ["auto", "mcmd"])
+
+
 def same_crs(one, other):
     """The same in meaning: GeoTIFF keeps a code, not the words of the text."""
     from osgeo import osr
@@ -40,12 +43,16 @@ def same_crs(one, other):
     return bool(systems[0].IsSame(systems[1], ["IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES"]))
 
 
-@pytest.mark.parametrize("variant", ["relaxed", "weighted", "paper"])
+@pytest.mark.parametrize(
+    "options",
+    [{}, dict(method="mcmd"), dict(variant="weighted"), dict(variant="paper")],
+    ids=["accurate", "relaxed", "weighted", "paper"],
+)
 @pytest.mark.parametrize("name", RAW)
-def test_raw_tiles(tmp_path, name, variant):
+def test_raw_tiles(tmp_path, name, options):
     path = shared_data(name)
     fingerprint, before = digest(path), raster.read(path)
-    result = fill_file(path, tmp_path / "out.tif", options=FillOptions(variant=variant))
+    result = fill_file(path, tmp_path / "out.tif", options=FillOptions(**options))
     after = raster.read(tmp_path / "out.tif")
     assert not after.void.any() and result.cells_unfilled == 0
     assert result.cells_filled == before.void.sum()
@@ -62,14 +69,16 @@ def test_raw_tiles(tmp_path, name, variant):
         assert known.min() - room <= filled.min() and filled.max() <= known.max() + room
 
 
-def test_voids_overshoot_their_rims_little():
+@every_method
+def test_voids_overshoot_their_rims_little(method):
     """Of 671 real voids of the Pyrenees, no filled cell lies beyond its rim by more than the rim's
     relief, and 95 % of the voids stay within a quarter of it.
     """
     tile = raster.read(shared_data("pyrenees_raw/N42E001.hgt"))
     filled = fill_voids(
-        tile.values, tile.void, pixel_size=tile.grid.pixel_size_m(), float_output=True
-    )
+        tile.values, tile.void, method=method, pixel_size=tile.grid.pixel_size_m(),
+        float_output=True,
+    )  # fmt: skip
     labels = filled.voids.labels[tile.void] - 1
     values = filled.values[tile.void]
     low, high = np.full(len(filled.voids), np.inf), np.full(len(filled.voids), -np.inf)
@@ -87,13 +96,15 @@ def test_all_nodata_is_refused(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@every_method
 @pytest.mark.parametrize("half", ["west", "south"])
-def test_half_a_tile_void(half):
+def test_half_a_tile_void(half, method):
     """Extrapolated: within the known range and a tenth of it, and level far from the rim."""
     tile = raster.read(shared_data("sierra_nevada/N37W004.hgt"))
     void = np.zeros(tile.values.shape, bool)
     void[(slice(None), slice(0, 600)) if half == "west" else (slice(601, None),)] = True
-    filled = fill_voids(tile.values, void, pixel_size=tile.grid.pixel_size_m()).values
+    size = tile.grid.pixel_size_m()
+    filled = fill_voids(tile.values, void, method=method, pixel_size=size).values
     known = tile.values[~void]
     room = 0.1 * np.ptp(known)
     assert filled[void].min() >= known.min() - room and filled[void].max() <= known.max() + room

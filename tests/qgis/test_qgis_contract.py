@@ -11,7 +11,7 @@ NODATA           string             -              optional
 MASK             raster             -              optional
 BELOW            number             -              optional advanced
 ABOVE            number             -              optional advanced
-METHOD           enum               mcmd           required
+METHOD           enum               auto           required
 NATURAL_ROUGHNESS boolean           False          required
 TUNE             boolean            False          required
 INTERIOR_ONLY    boolean            False          required
@@ -37,12 +37,14 @@ THREADS          number             -              optional advanced
 CREATION_OPTIONS string             -              optional advanced
 OUTPUT           rasterDestination  -              required
 SOURCE_MAP       rasterDestination  -              optional
+UNCERTAINTY      rasterDestination  -              optional
 REPORT           fileDestination    -              optional
 """
 
 OUTPUTS = {
     "OUTPUT": "outputRaster",
     "SOURCE_MAP": "outputRaster",
+    "UNCERTAINTY": "outputRaster",
     "REPORT": "outputFile",
     "VOIDS": "outputNumber",
     "CELLS_FILLED": "outputNumber",
@@ -69,12 +71,17 @@ def test_outputs_are_the_promised_ones(tool):
 
 def test_optional_outputs_are_not_made_unasked(tool):
     made = {each.name(): each.createByDefault() for each in tool.destinationParameterDefinitions()}
-    assert made == {"OUTPUT": True, "SOURCE_MAP": False, "REPORT": False}
+    unasked = dict.fromkeys(("SOURCE_MAP", "UNCERTAINTY", "REPORT"), False)
+    assert made == {"OUTPUT": True, **unasked}
 
 
 def test_words_instead_of_numbers_for_choices(tool):
     for name in ("METHOD", "VARIANT", "SCHEME"):
         assert tool.parameterDefinition(name).usesStaticStrings()
+
+
+def test_methods_are_the_promised_ones(tool):
+    assert tool.parameterDefinition("METHOD").options() == ["auto", "mcmd"]
 
 
 def test_every_parameter_has_a_label_and_help(tool):

@@ -49,7 +49,10 @@ def test_loads_and_unloads_in_the_window(registry):
         loaded.initGui()
         provider = registry.providerById("demsmith")
         names = {tool.name() for tool in provider.algorithms()}
-        assert names == {"fillvoids", "reconstructfromsamples", "thinraster"}
+        assert names == {
+            "fillvoids", "reconstructfromsamples", "reconstructmosaic", "reconstructsrtm",
+            "thinraster", "validatefill",
+        }  # fmt: skip
         assert provider.name() == "Demsmith"
         assert provider.longName() != provider.name()
         assert provider.versionInfo() == demsmith.__version__

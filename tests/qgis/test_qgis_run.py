@@ -24,6 +24,9 @@ from qgis.core import (
 )
 from support import digest, hills, make_hgt, make_raster, shared_data
 
+from demsmith.core.voids import FILLED, LEFT, ORIGINAL
+from demsmith.core.voids.accurate import SOURCE_OF_METHOD
+
 VOID = -32768
 
 
@@ -97,16 +100,45 @@ def test_maps_reach_the_core(fill, holed, tmp_path, name, value):
         assert (other == plain)[50:55, 0:2].all() or name == "L_BU_MAP"
 
 
+@pytest.mark.parametrize("method", ["auto", "mcmd"])
 @pytest.mark.parametrize(
     ("option", "left"), [({"INTERIOR_ONLY": True}, 10), ({"MAX_SIZE": 20}, 48), ({}, 0)]
 )
-def test_restrictions(fill, holed, tmp_path, option, left):
+def test_restrictions(fill, holed, tmp_path, option, left, method):
     source_map = str(tmp_path / "source.tif")
-    result = fill(holed[0], SOURCE_MAP=source_map, **option)
+    result = fill(holed[0], SOURCE_MAP=source_map, METHOD=method, **option)
     assert (result["CELLS_FILLED"], result["CELLS_UNFILLED"]) == (58 - left, left)
     assert (read(result["OUTPUT"])[0] == VOID).sum() == left
-    classes = np.bincount(read(result["SOURCE_MAP"])[0].ravel(), minlength=3)
-    assert classes.tolist() == [60 * 80 - 58, 58 - left, left]
+    codes = read(result["SOURCE_MAP"])[0]
+    by = [FILLED] if method == "mcmd" else SOURCE_OF_METHOD
+    assert (codes == ORIGINAL).sum() == 60 * 80 - 58
+    assert np.isin(codes, by).sum() == 58 - left
+    assert (codes == LEFT).sum() == left
+
+
+def test_uncertainty_is_written_and_reasons_are_told(fill, holed, tmp_path):
+    class Feedback(QgsProcessingFeedback):
+        def __init__(self):
+            super().__init__()
+            self.heard = []
+
+        def pushInfo(self, text):
+            self.heard.append(text)
+
+    feedback, path = Feedback(), str(tmp_path / "sigma.tif")
+    result = fill(holed[0], UNCERTAINTY=path, feedback=feedback)
+    assert result["UNCERTAINTY"] == path
+    sigma = read(path)[0]
+    np.testing.assert_array_equal(sigma > 0, holed[1] == VOID)
+    assert sum("%" in text and "cells" in text for text in feedback.heard) == 4
+
+
+def test_methods_differ(fill, holed, tmp_path):
+    auto, mcmd = (
+        read(fill(holed[0], METHOD=method, OUTPUT=str(tmp_path / f"{method}.tif"))["OUTPUT"])[0]
+        for method in ("auto", "mcmd")
+    )
+    assert (auto != mcmd).any()
 
 
 def test_report_holds_the_table_of_voids(fill, holed, tmp_path):
@@ -178,7 +210,7 @@ def test_layers_are_styled_when_loaded(plugin, holed, tmp_path, target):
     where = "TEMPORARY_OUTPUT" if target == "temporary" else str(tmp_path / "loaded.tif")
     processing.runAndLoadResults(
         "demsmith:fillvoids",
-        {"INPUT": holed[0], "OUTPUT": where, "SOURCE_MAP": "TEMPORARY_OUTPUT"},
+        {"INPUT": holed[0], "OUTPUT": where, "SOURCE_MAP": "TEMPORARY_OUTPUT", "METHOD": "mcmd"},
     )
     kinds = {layer.renderer().type(): layer for layer in project.mapLayers().values()}
     terrain = kinds["singlebandpseudocolor"]
@@ -191,8 +223,8 @@ def test_layers_are_styled_when_loaded(plugin, holed, tmp_path, target):
     assert len(stops) == 7
     assert stops == sorted(stops)
     classes = kinds["paletted"].renderer().classes()
-    assert [each.label for each in classes] == ["original", "filled", "void left as it was"]
-    assert [each.value for each in classes] == [0, 1, 2]
+    assert [each.label for each in classes] == ["original", "interpolated by MCMD"]
+    assert [each.value for each in classes] == [0, 1]
     from demsmith.algorithms.styling import _Style
 
     assert not _Style.alive
@@ -276,13 +308,14 @@ def _plain(tmp_path):
         (_plain, {"R_T_MAP": "{folder}/none.tif"}, "R_T_MAP"),
         (_plain, {"R_S_MAP": "{folder}/nines.tif", "OUTPUT": "{folder}/nines.tif"}, "is an input"),
         (_plain, {"METHOD": "magic"}, "METHOD"),
+        (_plain, {"METHOD": "mcmd", "UNCERTAINTY": "{folder}/s.tif"}, "needs the method auto"),
         (_plain, {"OUTPUT": "{folder}/filled.asc"}, ".asc” files are not supported"),
         (_plain, {"OUTPUT": "{folder}/none/filled.tif"}, "there is no folder"),
         (_plain, {"OUTPUT": "/proc/filled.tif"}, "cannot write"),
         (_plain, {"OUTPUT": "{folder}/plain.tif"}, "is an input"),
         (_plain, {"REPORT": "{folder}/filled.tif"}, "must be different files"),
         (_plain, {"CREATION_OPTIONS": "COMPRESS=MAGIC"}, "creation option refused"),
-        (lambda folder: str(folder / "missing.tif"), {}, "not found"),
+        (lambda folder: str(folder / "missing.tif"), {}, "does not exist"),
     ],
 )
 def test_errors_say_what_is_wrong_and_leave_nothing(fill, tmp_path, make, parameters, message):
