@@ -13,6 +13,9 @@ MARGIN = 64
 MANY_CELLS = 4096
 """So many level cells are water whatever their area."""
 
+FEW = 2
+"""So many cells of a rim that lie lower than water may be noise, however short the rim."""
+
 # Water beside one void has seldom two levels, never many.
 _LEVELS = 8
 
@@ -71,7 +74,7 @@ def survey_water(
                 lower += value < water
                 lowest = min(lowest, value)
             whole[number] = at >= share * rim.shape[0]
-            floor[number] = water if lower <= (1 - share) * rim.shape[0] else lowest
+            floor[number] = water if lower <= max((1 - share) * rim.shape[0], FEW) else lowest
 
 
 @numba.njit(**_JIT)

@@ -19,6 +19,7 @@ from demsmith.core.reconstruction.pipeline import reconstruct_ground
 from demsmith.core.reconstruction.plan import check_auxiliaries
 from demsmith.core.reconstruction.report import write_reports
 from demsmith.core.reconstruction.table import tabulate
+from demsmith.core.voids.accurate import UNCALIBRATED
 from demsmith.core.voids.sources import LEFT, ORIGINAL, SOURCES
 from demsmith.core.voids.table import VoidTable
 
@@ -209,16 +210,21 @@ def _result(own, around, done, made, paths):
         cells_faulty=made.faulty,
         auxiliaries=tuple(done.plan.alignments()),
         neighbours=around.neighbours,
-        warnings=tuple(_warnings(own, around, done, made)),
+        warnings=tuple(_warnings(own, around, done, paths.get("uncertainty"))),
         table=table,
     )
 
 
-def _warnings(own, around, done, made):
+def _warnings(own, around, done, uncertainty):
     yield from own.notes
     yield from around.notes
     if not own.void.any():
         yield f"'{own.source}' has no voids; its elevations are written as they are"
+    if uncertainty and not done.plan.model.calibrated:
+        yield f"'{own.source}': {UNCALIBRATED}"
+    for each in done.plan.alignments():
+        if not each["accepted"]:
+            yield f"auxiliary '{each['path']}' is not used: {each['reason']}"
     if done.large.size:
         yield large_note(done.extents.cells[done.large])
 

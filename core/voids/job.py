@@ -13,6 +13,7 @@ from demsmith.core.errors import InputError
 from demsmith.core.mcmd import read_maps
 from demsmith.core.options import validate
 from demsmith.core.progress import SILENT, Span, checkpoint
+from demsmith.core.voids.accurate import UNCALIBRATED
 from demsmith.core.voids.filling import fill_voids
 from demsmith.core.voids.options import FillOptions
 from demsmith.core.voids.sizes import SIZE_CLASSES
@@ -204,6 +205,8 @@ def _result(source, filled, paths, begin):
     warnings = list(source.notes)
     if not cells.size:
         warnings.append(f"'{source.source}' has no voids; its elevations are written as they are")
+    if paths["uncertainty"] and filled.model is not None and not filled.model.calibrated:
+        warnings.append(f"'{source.source}': {UNCALIBRATED}")
     if filled.tuned and not filled.tuned.accepted:
         warnings.append(f"'{source.source}': {filled.tuned.summary()}")
     return FillResult(

@@ -193,13 +193,29 @@ def test_features_tell_cells_apart():
 def test_sigma_scales_with_the_ground_and_the_learned_scale():
     voids, found = estimates(fractal(SHAPE))
     sigma = sigma_of(a_model(), found, voids.cells, INSIDE)
-    assert (sigma > 0).all()
+    most = 2 * np.hypot(found.deviation, units_of(found.roughness, 1.0))[found.void_of]
+    assert (sigma > 0).all() and (sigma <= most).all() and (sigma < most).any()
     twice = sigma_of(a_model(scale=(2.0,) * 4), found, voids.cells, INSIDE)
-    np.testing.assert_allclose(twice, 2 * sigma)
+    np.testing.assert_allclose(twice, np.minimum(2 * sigma, most))
     at_edge = np.array([True, False, False])
     mixed = sigma_of(a_model(), found, voids.cells, at_edge)
-    np.testing.assert_allclose(mixed, np.where(found.void_of == 0, 3, 1) * sigma)
+    threefold = np.where(found.void_of == 0, 3, 1) * sigma
+    np.testing.assert_allclose(mixed, np.minimum(threefold, most))
     _, steeper = estimates(10 * fractal(SHAPE))
     np.testing.assert_allclose(
         sigma_of(a_model(roughness=10.0), steeper, voids.cells, INSIDE), 10 * sigma, rtol=1e-3
     )
+
+
+def test_ground_of_which_nothing_is_known_but_its_height_makes_sigma_as_large():
+    """No cell has four known neighbours, so its bends are unknown."""
+    truth = fractal(SHAPE, seed=4) * 100
+    void = np.random.default_rng(0).random(SHAPE) > 0.02
+    voids = find_voids(void)
+    found = estimate_surfaces(
+        np.where(void, truth.mean(), truth), void, voids, np.arange(len(voids)), None,
+        dx=np.ones(SHAPE[0]), dy=np.ones(SHAPE[0]), tension=np.full(len(voids), 12.0),
+    )  # fmt: skip
+    sigma = sigma_of(a_model(), found, voids.cells, np.zeros(len(voids), bool))
+    assert np.median(sigma) > 0.3 * truth.std()
+    assert sigma.max() < 4 * truth.std()

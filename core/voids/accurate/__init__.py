@@ -2,7 +2,7 @@
 
 from demsmith.core.voids.accurate.estimates import margin
 from demsmith.core.voids.accurate.filling import SOURCE_OF_METHOD, Choices, estimate
-from demsmith.core.voids.accurate.model import ESTIMATORS, Model
+from demsmith.core.voids.accurate.model import ESTIMATORS, UNCALIBRATED, Model
 from demsmith.core.voids.accurate.training import learn
 from demsmith.core.voids.accurate.windows import BLOCK, Window, training_spans, training_windows
 
@@ -10,6 +10,7 @@ __all__ = [
     "BLOCK",
     "ESTIMATORS",
     "SOURCE_OF_METHOD",
+    "UNCALIBRATED",
     "Choices",
     "Model",
     "Window",

@@ -14,7 +14,7 @@ _PASSES = 2  # the second finds its structure in the first one's surface
 def estimate_voids(
     work, void, runs, first_run, numbers, margins, learnable, spreads, strengths,
     weights, noise, tension, stiffness, dx, dy, first_cell, estimates, distance, roughness,
-    steepness,
+    steepness, deviation,
 ):  # fmt: skip
     """Estimate the cells of some voids by every estimator.
 
@@ -42,13 +42,16 @@ def estimate_voids(
         Root mean square of the Laplacian of the ground around the void, elevation by row².
     steepness : (N,) float64 array, written
         Root mean square of its slope, elevation by row.
+    deviation : (N,) float64 array, written
+        Standard deviation of its elevations.
     """
     for i in range(numbers.size):
         begin, end = first_run[numbers[i]], first_run[numbers[i] + 1]
-        z, state, datum, top, left, roughness[i], steepness[i] = survey_void(
+        z, state, datum, top, left, relief = survey_void(
             work, void, runs, begin, end, margins[i], dx[i], dy[i], first_cell[i],
             estimates, distance,
         )  # fmt: skip
+        roughness[i], steepness[i], deviation[i] = relief
         if learnable[i]:
             smooth = z.copy()
             solve_learned(smooth, state, weights[i], noise)
@@ -67,8 +70,8 @@ def survey_void(
     """Copy out the ground around a void, and note all that needs no solving.
 
     Gives the elevations above a datum, the states of their cells, the datum, the window's first
-    row and column, and the ground's roughness and steepness; notes the first estimate, as the
-    learned one too.
+    row and column, and the ground's roughness, steepness and deviation; notes the first estimate,
+    as the learned one too.
     """
     top, bottom, left, right = bounds(runs, begin, end, margin, work.shape)
     state = states(void, runs, begin, end, top, bottom, left, right)
@@ -79,8 +82,7 @@ def survey_void(
     put(z, datum, runs, begin, end, top, left, estimates[1], first_cell)
     away = _distance(state, dx / dy)
     put(away, 0.0, runs, begin, end, top, left, distance, first_cell)
-    roughness, steepness = _relief(z, state, dy / dx)
-    return z, state, datum, top, left, roughness, steepness
+    return z, state, datum, top, left, _relief(z, state, dy / dx)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -137,10 +139,19 @@ def _distance(state, across):
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def _relief(z, state, aspect):
-    """Give the root mean squares of the Laplacian and the gradient of the known cells."""
-    bends, slopes, count = 0.0, 0.0, 0
+    """Give root mean squares of the Laplacian, the gradient and the elevation of the known cells.
+
+    Where no cell's four neighbours are known, the elevations' stands for the Laplacian's: of such
+    ground nothing is known but how high it lies.
+    """
+    bends, slopes, heights, count, known = 0.0, 0.0, 0.0, 0, 0
     high, wide = z.shape
     squared = aspect * aspect
+    for r in range(high):
+        for c in range(wide):
+            if state[r, c] == KNOWN:
+                heights += z[r, c] * z[r, c]
+                known += 1
     for r in range(1, high - 1):
         for c in range(1, wide - 1):
             if (
@@ -153,4 +164,7 @@ def _relief(z, state, aspect):
                 slopes += (z[r + 1, c] - z[r - 1, c]) ** 2 / 4
                 slopes += squared * (z[r, c + 1] - z[r, c - 1]) ** 2 / 4
                 count += 1
-    return np.sqrt(bends / max(count, 1)), np.sqrt(slopes / max(count, 1))
+    deviation = np.sqrt(heights / max(known, 1))
+    if count == 0:
+        return deviation, 0.0, deviation
+    return np.sqrt(bends / count), np.sqrt(slopes / count), deviation

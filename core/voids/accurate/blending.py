@@ -51,11 +51,16 @@ def features_of(estimates, cells, units):
 
 
 def sigma_of(model, estimates, cells, at_edge):
-    """Give the standard error [m] to be expected of the blend in each of the M cells."""
+    """Give the standard error [m] to be expected of the blend in each of the M cells.
+
+    It is at most twice what the ground around the void varies by, in height and in bends.
+    """
     units = units_of(estimates.roughness, model.roughness)
     spread = np.exp(model.spread @ features_of(estimates, cells, units))
     scale = np.where(at_edge, model.scale_at_edge, np.exp(_by_size(np.log(model.scale), cells)))
-    return spread * (units * scale)[estimates.void_of]
+    void_of = estimates.void_of
+    most = 2 * np.hypot(estimates.deviation, units)
+    return np.minimum(spread * (units * scale)[void_of], most[void_of])
 
 
 def _by_size(of_class, cells):

@@ -37,9 +37,9 @@ class Estimates:
         Elevations by each of `demsmith.core.voids.accurate.model.ESTIMATORS`.
     distance : (M,) float64 array
         To known ground, in rows.
-    roughness, steepness : (N,) float64 arrays
-        Root mean squares of the Laplacian [m by row²] and the slope [m by row] of the ground around
-        each void.
+    roughness, steepness, deviation : (N,) float64 arrays
+        Root mean squares of the Laplacian [m by row²] and the slope [m by row], and standard
+        deviation of the elevation [m] of the ground around each void.
     """
 
     cells: np.ndarray
@@ -48,6 +48,7 @@ class Estimates:
     distance: np.ndarray
     roughness: np.ndarray
     steepness: np.ndarray
+    deviation: np.ndarray
 
     @property
     def void_of(self):
@@ -119,7 +120,7 @@ def estimate_surfaces(
     size = voids.cells[selected]
     cells, first = cells_of(voids, selected, work.shape[1])
     out = Estimates(
-        cells, first, np.empty((3, cells.size)), np.empty(cells.size), *np.empty((2, selected.size))
+        cells, first, np.empty((3, cells.size)), np.empty(cells.size), *np.empty((3, selected.size))
     )
     middle = work_rows(voids, selected)
     dx, dy = np.asarray(dx)[middle], np.asarray(dy)[middle]
@@ -134,17 +135,17 @@ def estimate_surfaces(
     )  # fmt: skip
 
     def estimate(chosen):
-        relief = np.empty((2, chosen.size))
+        relief = np.empty((3, chosen.size))
         estimate_voids(
             work, void, voids.runs, voids.first_run, selected[chosen],
             *(each[chosen] for each in by_void), covariance.noise if covariance else 0.0,
             *(each[chosen] for each in lengths), out.surfaces, out.distance, *relief,
         )  # fmt: skip
-        out.roughness[chosen], out.steepness[chosen] = relief
+        out.roughness[chosen], out.steepness[chosen], out.deviation[chosen] = relief
 
     def estimate_giant(k):
         margins, _, spreads, strengths, _ = by_void
-        out.roughness[k], out.steepness[k] = _estimate_giant(
+        out.roughness[k], out.steepness[k], out.deviation[k] = _estimate_giant(
             work, void, voids, selected[k], margins[k],
             tuple(each[k] for each in (spreads, strengths, *lengths)), out, Muted(progress),
         )  # fmt: skip
@@ -178,7 +179,7 @@ def _estimate_giant(work, void, voids, number, margin, shape, out, progress):
 
     spread, strength, tension, stiffness, dx, dy, first = shape
     where = voids.runs, voids.first_run[number], voids.first_run[number + 1]
-    z, state, datum, top, left, *relief = survey_void(
+    z, state, datum, top, left, relief = survey_void(
         work, void, *where, margin, dx, dy, first, out.surfaces, out.distance
     )
     solve_giant(z, state, spread, strength, tension, stiffness, dx, dy, progress)

@@ -18,6 +18,13 @@ FEATURES = 4
 estimators disagree by, relative to the ground's roughness."""
 
 
+UNCALIBRATED = (
+    "too little ground is known to try artificial voids in; the usual shares were taken, and the "
+    "uncertainty is a guess"
+)
+"""What to say where a model is not calibrated."""
+
+
 @dataclass(frozen=True)
 class Model:
     """The ground of a raster or mosaic, as filling its voids needs to know it.
@@ -61,6 +68,11 @@ class Model:
     roughness: float
     at_edge: np.ndarray
     scale_at_edge: float
+
+    @property
+    def calibrated(self):
+        """Whether any artificial void could be tried."""
+        return bool(self.tried.any())
 
     def reason(self, size_class):
         """Say in a sentence why voids of a class are filled as they are."""
