@@ -213,7 +213,7 @@ def test_ground_that_nothing_can_be_tried_on(values, void, said):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"methods": ["kriging"]}, "no method 'kriging'; choose from mcmd"),
+        ({"methods": ["kriging"]}, "no method 'kriging'; choose from auto, mcmd"),
         ({"methods": []}, "no method is given"),
         ({"methods": ["gdal", "gdal"]}, "named twice"),
         ({"share": 0.9}, "share is 0.9"),
