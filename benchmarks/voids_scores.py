@@ -62,8 +62,7 @@ class Scores:
         holed = np.where(void, 0, ground.values)
         for engine in engines():
             filled = demsmith.fill_voids(holed, void, pixel_size=ground.pixel_size, method=engine)
-            sigma = getattr(filled, "sigma", None)
-            self._tallies[engine][case] = holes.tally(filled.values, sigma)
+            self._tallies[engine][case] = holes.tally(filled.values, filled.sigma)
 
     def cases(self, *methods, name=None, kind=None):
         """List the masks that all these methods did, of a tile or kind or of all."""

@@ -4,6 +4,7 @@ import numpy as np
 
 from demsmith.core.progress import SILENT, checkpoint
 from demsmith.core.voids.accurate import BLOCK, Window, training_spans
+from demsmith.core.voids.accurate.windows import cells_by_block
 
 
 def count_voids(ground, rows, columns, *, progress=SILENT):
@@ -45,8 +46,7 @@ def gathered_counts(shape, found, chunks):
     (H, W) int64 array
         Void cells of each block.
     """
-    sides = [np.diff(np.minimum(np.arange(0, n + BLOCK, BLOCK), n)) for n in shape]
-    counts = np.outer(*sides)
+    counts = cells_by_block(shape)
     for (row, column, part), (rows, columns) in zip(found, chunks, strict=True):
         cells = np.outer(_shares(rows), _shares(columns))
         block = slice(row, row + part.shape[0]), slice(column, column + part.shape[1])

@@ -15,7 +15,7 @@ from demsmith.core.voids.accurate.blending import (
 from demsmith.core.voids.accurate.estimates import TENSION_CELLS
 from demsmith.core.voids.accurate.model import ESTIMATORS, Model
 from demsmith.core.voids.accurate.spectrum import learn_covariance
-from demsmith.core.voids.accurate.trials import QUOTA, run_trials
+from demsmith.core.voids.accurate.trials import QUOTA, filled_by_mcmd, run_trials
 from demsmith.core.voids.accurate.windows import as_float
 from demsmith.core.voids.sizes import size_class
 
@@ -78,18 +78,13 @@ def learn(windows, *, tension=None, threads=None, progress=SILENT):
 
 def _without_gaps(windows, tension, threads, progress):
     """Fill the windows' own voids by MCMD, so that their spectra can be taken."""
-    from demsmith.core.voids.filling import fill_voids
-
     filled = []
     for n, window in enumerate(windows):
         part = Span(progress, n / len(windows), (n + 1) / len(windows))
-        z = as_float(window.values)
         if window.void.any():
-            z = fill_voids(
-                z, window.void, method="mcmd", pixel_size=(window.dx, window.dy), tension=tension,
-                threads=threads, progress=part,
-            ).values  # fmt: skip
-        filled.append(z)
+            filled.append(filled_by_mcmd(window, window.void, tension, threads, part))
+        else:
+            filled.append(as_float(window.values))
     return filled
 
 

@@ -38,13 +38,8 @@ class Trial:
     """
 
     def __init__(self, window, void, voids, chosen, covariance, *, tension, threads, progress):
-        from demsmith.core.voids.filling import fill_voids
-
         self._ground = as_float(window.values)
-        self._start = fill_voids(
-            self._ground, void, method="mcmd", pixel_size=(window.dx, window.dy), tension=tension,
-            threads=threads,             progress=Span(progress, 0, 0.2),
-        ).values  # fmt: skip
+        self._start = filled_by_mcmd(window, void, tension, threads, Span(progress, 0, 0.2))
         selected, self.at_edge = chosen
         self._where = void, voids
         self._selected = selected
@@ -78,6 +73,16 @@ class Trial:
         """Take other errors of the structured surface for some cells, and their surface."""
         self.errors[2, cells] = structured_errors[cells]
         self.estimates.surfaces[2] = self.errors[2] + self._truth(self.estimates)
+
+
+def filled_by_mcmd(window, void, tension, threads, progress):
+    """Give a window's elevations, the cells of ``void`` filled by MCMD."""
+    from demsmith.core.voids.filling import fill_voids  # which learns, and so comes here
+
+    return fill_voids(
+        as_float(window.values), void, method="mcmd", pixel_size=(window.dx, window.dy),
+        tension=tension, threads=threads, progress=progress,
+    ).values  # fmt: skip
 
 
 def run_trials(windows, covariance, *, tension=None, threads=None, progress=SILENT):

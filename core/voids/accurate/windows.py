@@ -45,6 +45,18 @@ def as_float(values):
     return np.asarray(values, np.float32 if values.dtype == np.float32 else np.float64)
 
 
+def cells_by_block(shape):
+    """Give the cells of each block of a raster, an (R, C) array.
+
+    Examples
+    --------
+    >>> cells_by_block((600, 2))
+    array([[1024],
+           [ 176]])
+    """
+    return np.outer(*(np.diff(np.minimum(np.arange(0, n + BLOCK, BLOCK), n)) for n in shape))
+
+
 def training_spans(shape, voids):
     """Choose the blocks from which to learn: those with most voids of those that know enough.
 
@@ -65,15 +77,15 @@ def training_spans(shape, voids):
     >>> training_spans((600, 512), np.array([[9], [0]]))
     [(slice(0, 512, None), slice(0, 512, None)), (slice(512, 600, None), slice(0, 512, None))]
     """
-    sides = [np.diff(np.minimum(np.arange(0, n + BLOCK, BLOCK), n)) for n in shape]
-    cells = np.outer(*sides).ravel()
+    by_block = cells_by_block(shape)
+    cells = by_block.ravel()
     voids = np.asarray(voids).ravel()
     enough = cells - voids >= _LEAST_KNOWN * BLOCK**2
     # Among equals a random order, always the same, takes blocks from here and there.
     tie = np.random.default_rng(0).permutation(cells.size)
     order = np.lexsort((tie, -np.where(enough, voids, cells - voids), ~enough))
     chosen = np.sort(order[:_MOST])
-    rows, columns = np.divmod(chosen, len(sides[1]))
+    rows, columns = np.divmod(chosen, by_block.shape[1])
     return [
         (_span(row, shape[0]), _span(column, shape[1]))
         for row, column in zip(rows.tolist(), columns.tolist(), strict=True)
