@@ -16,9 +16,11 @@ LAGS = (1, 2, 4, 8)
 MARGIN = 12  # cells around a void that count as its surroundings
 LARGE = 100  # cells of the largest void that is left out
 ROUGH = "natural roughness"
-SURFACES = {"fill (default)": {}, ROUGH: {"natural_roughness": True}}
+ACCURATE = {"fill (default, `auto`)": {"method": "auto"}}
+SURFACES = {**ACCURATE, "mcmd": {}, ROUGH: {"natural_roughness": True}}
 AXIS_SURFACES = {
-    "fill (default)": {},
+    **ACCURATE,
+    "mcmd": {},
     "weighted": {"variant": "weighted"},
     "weighted, diamond–square": {"variant": "weighted", "scheme": "diamond-square"},
     "paper": {"variant": "paper"},
@@ -61,7 +63,11 @@ class Punched:
         """Give the filled surfaces by label, and the truth, as float64."""
         made = {
             label: demsmith.fill_voids(
-                self.truth, self.void, method="mcmd", pixel_size=self.sizes, threads=2, **options
+                self.truth,
+                self.void,
+                pixel_size=self.sizes,
+                threads=2,
+                **{"method": "mcmd", **options},
             ).values
             for label, options in ways.items()
         }
@@ -87,7 +93,7 @@ def roughness(quick):
         for label in surfaces[0]:
             own = [(case, made[label]) for case, made in zip(cases, surfaces, strict=True)]
             ratios.append([name, label, *_lag_ratios(own)])
-            steps.append([name, label, *_steps(own), f"{_rmse(own):.2f}"])
+            steps.append([name, label, *_steps(own), _slope_step(own), f"{_rmse(own):.2f}"])
     return "\n\n".join(
         [
             "### Natural roughness: `fill --natural-roughness`",
@@ -96,9 +102,21 @@ def roughness(quick):
             f"the known pairs within {MARGIN} cells of its bounding box, at lags h in cells; sums "
             "over voids weighted by their pairs, and in brackets the median void's.",
             table(["tile", "surface", *(f"h = {lag}" for lag in LAGS)], ratios),
-            "Mean step [m] between neighbouring cells across the rim and inside, and the price: "
-            "RMSE [m] of all void cells.",
-            table(["tile", "surface", "across the rim", "inside", "rim ÷ inside", "RMSE"], steps),
+            "Mean step [m] between neighbouring cells across the rim and inside; mean change of "
+            "slope (second difference) of three cells across the rim ÷ that of the known ground "
+            f"within {MARGIN} cells; and the price: RMSE [m] of all void cells.",
+            table(
+                [
+                    "tile",
+                    "surface",
+                    "across the rim",
+                    "inside",
+                    "rim ÷ inside",
+                    "slope step, rim ÷ around",
+                    "RMSE",
+                ],
+                steps,
+            ),
         ]
     )
 
@@ -158,6 +176,26 @@ def _steps(own):
             inside.append(step[(in_a > 0) & (in_b > 0)])
     across, within = (float(np.concatenate(part).mean()) for part in (rim, inside))
     return f"{across:.2f}", f"{within:.2f}", f"**{across / within:.2f}**"
+
+
+def _slope_step(own):
+    """Give the mean change of slope across rims ÷ that of the known ground around."""
+    rim, around = [], []
+    for case, z in own:
+        surroundings = case.surroundings
+        for axis in (0, 1):
+            change = abs(np.diff(z, 2, axis))
+            inside, known = (_triples(cells, axis) for cells in (case.large > 0, surroundings))
+            rim.append(change[(sum(inside) > 0) & (sum(known) > 0)])
+            around.append(change[sum(known) == 3])
+    across, outside = (float(np.concatenate(part).mean()) for part in (rim, around))
+    return f"**{across / outside:.2f}**"
+
+
+def _triples(cells, axis):
+    """Give, as 0 and 1, the first, second and third of three neighbouring cells in a line."""
+    cells = np.moveaxis(cells.astype(np.int8), axis, 0)
+    return [np.moveaxis(part, 0, axis) for part in (cells[:-2], cells[1:-1], cells[2:])]
 
 
 def _rmse(own):

@@ -3,13 +3,18 @@
 import numba
 import numpy as np
 
-from demsmith.core.voids.accurate._banded import add_square, bandwidth, solve_band
+from demsmith.core.voids.accurate._banded import bandwidth, solve_band
 from demsmith.core.voids.accurate._locality import BLANK, GHOST, KNOWN, box_around, number_cells
 
 # Weight of the void's own cells, which are only estimates, beside known ones in a structure tensor.
 _ESTIMATE = 0.3
 # The larger eigenvalue of the metric over the smaller is at most the square of this.
 _STRONGEST = 4.0
+
+# A cell's equation has cells up to so many rows above it and so many columns to either side.
+_REACH = 3
+_ACROSS = 2 * _REACH + 1
+_SLOTS = (_REACH + 1) * _ACROSS
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -22,14 +27,8 @@ def solve_structured(z, state, spread, strength, tension, stiffness, dx, dy):
     strength : exponent of the metric; 0: the same in all directions.
     tension, stiffness : lengths in rows.
     """
-    number = np.empty(z.shape, np.int64)
-    count = number_cells(state, number)
-    box = box_around(number, 2)
-    metric = _metric(z, state, box, spread, strength, dx, dy)
-    width = max(bandwidth(number, 3, 2), bandwidth(number, 2, 3))
-    band = np.zeros((count, width + 1))
-    right = np.zeros(count)
-    _assemble(z, state, number, box, metric, tension, stiffness, dy / dx, band, right)
+    number, stencil, right = equations(z, state, spread, strength, tension, stiffness, dx, dy)
+    band = _as_band(stencil, number, max(bandwidth(number, 3, 2), bandwidth(number, 2, 3)))
     if not solve_band(band, right):
         return False
     high, wide = z.shape
@@ -38,6 +37,67 @@ def solve_structured(z, state, spread, strength, tension, stiffness, dx, dy):
             if number[r, c] >= 0:
                 z[r, c] = right[number[r, c]]
     return True
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def equations(z, state, spread, strength, tension, stiffness, dx, dy):
+    """Give the linear equations of the surface; arguments as of `solve_structured`.
+
+    number : (h, w) int64, see `number_cells`.
+    stencil : (n, 28), half of the symmetric matrix: element (i, j) in the slot of where cell j lies
+        seen from cell i, see `_slot`; of two cells, the upper or left one is j.
+    right : (n,), the right-hand side.
+    """
+    number = np.empty(z.shape, np.int64)
+    count = number_cells(state, number)
+    box = box_around(number, 2)
+    metric = _metric(z, state, box, spread, strength, dx, dy)
+    stencil = np.zeros((count, _SLOTS))
+    right = np.zeros(count)
+    _assemble(z, state, number, box, metric, tension, stiffness, dy / dx, stencil, right)
+    return number, stencil, right
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def as_elements(stencil, number):
+    """List row, column and value of the elements of both halves of the matrix."""
+    size = 2 * np.count_nonzero(stencil) - stencil.shape[0]
+    rows, columns = np.empty(size, np.int32), np.empty(size, np.int32)
+    values = np.empty(size)
+    k = 0
+    high, wide = number.shape
+    for r in range(high):
+        for c in range(wide):
+            i = number[r, c]
+            if i < 0:
+                continue
+            for slot in range(_SLOTS):
+                value = stencil[i, slot]
+                if value != 0:
+                    j = number[r - slot // _ACROSS, c + slot % _ACROSS - _REACH]
+                    rows[k], columns[k], values[k] = i, j, value
+                    k += 1
+                    if j != i:
+                        rows[k], columns[k], values[k] = j, i, value
+                        k += 1
+    return rows[:k], columns[:k], values[:k]
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _as_band(stencil, number, width):
+    """Lay the matrix into a band as `_banded` keeps it."""
+    band = np.zeros((stencil.shape[0], width + 1))
+    high, wide = number.shape
+    for r in range(high):
+        for c in range(wide):
+            i = number[r, c]
+            if i < 0:
+                continue
+            for slot in range(_SLOTS):
+                if stencil[i, slot] != 0:
+                    j = number[r - slot // _ACROSS, c + slot % _ACROSS - _REACH]
+                    band[max(i, j), width - abs(i - j)] = stencil[i, slot]
+    return band
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -122,7 +182,7 @@ def _blurred(fields, box, spread):
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def _assemble(z, state, number, box, metric, tension, stiffness, aspect, band, right):
+def _assemble(z, state, number, box, metric, tension, stiffness, aspect, stencil, right):
     """Sum the energy's squares over the cells near the void."""
     high, wide = z.shape
     top, bottom, left, right_end = box
@@ -147,40 +207,69 @@ def _assemble(z, state, number, box, metric, tension, stiffness, aspect, band, r
             if whole[r, c]:
                 _gather(z, number, r - 1, c - 1, 3, 3, numbers, elevations)
                 _operator(metric, r, c, aspect, 3, 0, 0, coefficients, 9)
-                add_square(band, right, numbers, elevations, coefficients, 9, 1.0)
+                _add_square(stencil, right, numbers, elevations, coefficients, 3, 3, 1.0)
                 if stiff > 0 and whole[r, c + 1]:
                     _gather(z, number, r - 1, c - 1, 3, 4, numbers, elevations)
                     _operator(metric, r, c, aspect, 4, 0, 0, other, 12)
                     _operator(metric, r, c + 1, aspect, 4, 0, 1, coefficients, 12)
                     coefficients -= other
-                    add_square(
-                        band, right, numbers, elevations, coefficients, 12, stiff * aspect**2
-                    )
+                    weight = stiff * aspect**2
+                    _add_square(stencil, right, numbers, elevations, coefficients, 3, 4, weight)
                 if stiff > 0 and whole[r + 1, c]:
                     _gather(z, number, r - 1, c - 1, 4, 3, numbers, elevations)
                     _operator(metric, r, c, aspect, 3, 0, 0, other, 12)
                     _operator(metric, r + 1, c, aspect, 3, 1, 0, coefficients, 12)
                     coefficients -= other
-                    add_square(band, right, numbers, elevations, coefficients, 12, stiff)
+                    _add_square(stencil, right, numbers, elevations, coefficients, 4, 3, stiff)
             else:
                 coefficients[0], coefficients[1], coefficients[2] = 1.0, -2.0, 1.0
                 if 0 < c < wide - 1 and state[r, c - 1] != BLANK and state[r, c + 1] != BLANK:
                     _gather(z, number, r, c - 1, 1, 3, numbers, elevations)
                     weight = (metric[0, r, c] * aspect**2) ** 2
-                    add_square(band, right, numbers, elevations, coefficients, 3, weight)
+                    _add_square(stencil, right, numbers, elevations, coefficients, 1, 3, weight)
                 if 0 < r < high - 1 and state[r - 1, c] != BLANK and state[r + 1, c] != BLANK:
                     _gather(z, number, r - 1, c, 3, 1, numbers, elevations)
                     weight = metric[1, r, c] ** 2
-                    add_square(band, right, numbers, elevations, coefficients, 3, weight)
+                    _add_square(stencil, right, numbers, elevations, coefficients, 3, 1, weight)
             coefficients[0], coefficients[1] = -1.0, 1.0
             if c + 1 < wide and state[r, c + 1] != BLANK:
                 _gather(z, number, r, c, 1, 2, numbers, elevations)
                 weight = pull * aspect**2 * metric[0, r, c]
-                add_square(band, right, numbers, elevations, coefficients, 2, weight)
+                _add_square(stencil, right, numbers, elevations, coefficients, 1, 2, weight)
             if r + 1 < high and state[r + 1, c] != BLANK:
                 _gather(z, number, r, c, 2, 1, numbers, elevations)
                 weight = pull * metric[1, r, c]
-                add_square(band, right, numbers, elevations, coefficients, 2, weight)
+                _add_square(stencil, right, numbers, elevations, coefficients, 2, 1, weight)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _add_square(stencil, right, numbers, elevations, coefficients, high, wide, weight):
+    """Add ``weight`` times the square of a sum over a block of cells to what is to be least.
+
+    A cell with a number of at least 0 is unknown; the others bring their elevation.
+    """
+    count = high * wide
+    known = 0.0
+    for a in range(count):
+        if numbers[a] < 0:
+            known += coefficients[a] * elevations[a]
+    for a in range(count):
+        i = numbers[a]
+        if i < 0:
+            continue
+        scaled = weight * coefficients[a]
+        right[i] -= scaled * known
+        for b in range(a + 1):
+            if numbers[b] >= 0:
+                stencil[i, _slot(a // wide - b // wide, b % wide - a % wide)] += (
+                    scaled * coefficients[b]
+                )
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _slot(up, right):
+    """Give the place in an equation of the cell so many rows up and columns to the right."""
+    return up * _ACROSS + right + _REACH
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
