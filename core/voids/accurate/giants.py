@@ -6,6 +6,8 @@ between the known ground and the coarser surface: one cycle of the multigrid met
 and McCormick 2000, "A multigrid tutorial"), with a direct factor as its smoother.
 """
 
+from concurrent.futures import ThreadPoolExecutor, wait
+
 import numpy as np
 
 from demsmith.core.progress import SILENT, Span, checkpoint
@@ -57,10 +59,10 @@ def solve_giant(z, state, spread, strength, tension, stiffness, dx, dy, progress
         factor *= 2
     coarse, coarse_state = coarsen(z, state, factor) if factor > 1 else (z, state)
     for done in range(_PASSES):
-        checkpoint(progress, 0.3 * done / _PASSES)
         _solve_sparse(
             coarse, coarse_state, max(spread / factor, 1.0), strength, tension / factor,
             stiffness, factor * dx, factor * dy,
+            progress=Span(progress, 0.3 * done / _PASSES, 0.3 * (done + 1) / _PASSES),
         )  # fmt: skip
     if factor == 1:
         return
@@ -91,22 +93,39 @@ def solve_giant(z, state, spread, strength, tension, stiffness, dx, dy, progress
     checkpoint(progress, 1.0)
 
 
-def _solve_sparse(z, state, *shape):
+def _solve_sparse(z, state, *shape, progress):
     """Do what `solve_structured` does, with a sparse factor (SuperLU's) in place of a band."""
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu
 
     from demsmith.core.voids.accurate._structured import as_elements, equations
 
+    def solution():
+        rows, columns, values = as_elements(stencil, number)
+        matrix = csc_array((values, (rows, columns)), shape=(right.size, right.size))
+        # Symmetric and positive: the diagonal needs no search for pivots.
+        return splu(
+            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        ).solve(right)  # fmt: skip
+
+    checkpoint(progress, 0.0)
     number, stencil, right = equations(z, state, *shape)
-    rows, columns, values = as_elements(stencil, number)
-    matrix = csc_array((values, (rows, columns)), shape=(right.size, right.size))
-    # Symmetric and positive: the diagonal needs no search for pivots.
-    factor = splu(
-        matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
+    solved = _in_background(solution, progress)
     unknown = number >= 0
-    z[unknown] = factor.solve(right)[number[unknown]]
+    z[unknown] = solved[number[unknown]]
+
+
+def _in_background(task, progress):
+    """Give a task's result; if ``progress`` asks to stop, do not wait for it."""
+    helper = ThreadPoolExecutor(1)
+    try:
+        future = helper.submit(task)
+        while not wait([future], timeout=0.1).done:
+            checkpoint(progress, 0.5)
+        return future.result()
+    finally:
+        helper.shutdown(wait=False)
 
 
 def _inside(shape, top, left):
