@@ -38,8 +38,9 @@ $(NUMPY2)/numpy2.stamp: $(SETUP_FILES) | $(VENV)/test.stamp
 demo: $(VENV)/demo.stamp ## fill the voids of a real tile, score it, draw it; TILE=path: of your own
 	@$(PY) demo/demo.py $(if $(TILE),--tile "$(TILE)")
 
+# Two at once, whole files each: their fixtures are shared, and kernels are compiled once.
 test: lint env-numpy2 ## every check: style, imports, the suite with QGIS's part, the zip
-	@$(PY) -m pytest
+	@$(PY) -m pytest -n 2 --dist loadfile
 
 lint: $(VENV)/test.stamp ## style and the direction of imports
 	@$(PY) -m ruff check .
@@ -47,12 +48,14 @@ lint: $(VENV)/test.stamp ## style and the direction of imports
 	@$(PY) -m flake8
 	@$(VENV)/bin/lint-imports --no-logo --no-cache
 
-bench: $(VENV)/test.stamp ## measure against the peers in the same run: filling, samples, tuning, reconstruction
+bench: $(VENV)/test.stamp ## measure against the peers in the same run: filling, samples, tuning, reconstruction, sunlight
 	@$(PY) benchmarks/fill.py
 	@$(PY) benchmarks/mcmd.py
 	@$(PY) benchmarks/tuning.py
 	@$(PY) benchmarks/voids.py
 	@$(PY) benchmarks/voids_auxiliary.py
+	@$(PY) benchmarks/solar.py
+	@$(PY) benchmarks/drainage.py
 
 zip: ## the plugin as QGIS installs it, from the last commit (REVISION=… for another)
 	@mkdir -p "$(DIST)"

@@ -18,6 +18,7 @@ from demsmith.algorithms.parameters import (
     tr,
 )
 from demsmith.algorithms.source import BandTool
+from demsmith.algorithms.voidfilling import VoidFilling, add_cell_maps
 
 _HELP = """
 {picture}
@@ -51,7 +52,7 @@ _FILLED_COUNTS = (
 )
 
 
-class FillVoids(BandTool):
+class FillVoids(VoidFilling, BandTool):
     """Fill the voids of a raster: `demsmith.core.voids.fill_file` in Processing."""
 
     def name(self):
@@ -61,14 +62,6 @@ class FillVoids(BandTool):
     def displayName(self):
         """Name the tool in the toolbox."""
         return tr("Fill voids")
-
-    def group(self):
-        """Name the tool's group in the toolbox."""
-        return tr("Void filling")
-
-    def groupId(self):
-        """Name the tool's group in ids."""
-        return "voids"
 
     def tags(self):
         """List words under which the tool is found."""
@@ -98,14 +91,7 @@ class FillVoids(BandTool):
     def _declare_outputs(self):
         add(self, QgsProcessingParameterRasterDestination("OUTPUT", tr("Filled")),
             help_text="GeoTIFF with the voids filled.")  # fmt: skip
-        add(self, QgsProcessingParameterRasterDestination(
-                "SOURCE_MAP", tr("Source map"), optional=True, createByDefault=False),
-            help_text="GeoTIFF of 0 original, 2 a void left as it was, others by what the cell was "
-            "filled.")  # fmt: skip
-        add(self, QgsProcessingParameterRasterDestination(
-                "UNCERTAINTY", tr("Uncertainty"), optional=True, createByDefault=False),
-            help_text="GeoTIFF of the standard error to be expected in filled cells, 0 in known "
-            "ones. Method auto only.")  # fmt: skip
+        add_cell_maps(self)
         add(self, QgsProcessingParameterFileDestination(
                 "REPORT", tr("Report"), tr("JSON files (*.json)"),
                 optional=True, createByDefault=False),

@@ -56,16 +56,25 @@ class DemsmithProvider(QgsProcessingProvider):
         if not dependencies.python_suffices():
             QgsMessageLog.logMessage(dependencies.problem(), "Demsmith", Qgis.MessageLevel.Warning)
             return
+        from demsmith.algorithms.chain import chains
+        from demsmith.algorithms.drainagearea import DrainageArea
         from demsmith.algorithms.fillvoids import FillVoids
         from demsmith.algorithms.reconstructfromsamples import ReconstructFromSamples
         from demsmith.algorithms.reconstructmosaic import ReconstructMosaic
         from demsmith.algorithms.reconstructsrtm import ReconstructSrtm
+        from demsmith.algorithms.relief import Relief
+        from demsmith.algorithms.solarirradiance import SolarIrradiance
         from demsmith.algorithms.thinraster import ThinRaster
         from demsmith.algorithms.validatefill import ValidateFill
 
+        self.addAlgorithm(DrainageArea())
         self.addAlgorithm(FillVoids())
         self.addAlgorithm(ReconstructFromSamples())
         self.addAlgorithm(ReconstructMosaic())
         self.addAlgorithm(ReconstructSrtm())
+        self.addAlgorithm(Relief())
+        self.addAlgorithm(SolarIrradiance())
         self.addAlgorithm(ThinRaster())
         self.addAlgorithm(ValidateFill())
+        for chain in chains():
+            self.addAlgorithm(chain)

@@ -5,6 +5,16 @@ from qgis.core import QgsProcessing, QgsProcessingParameterMultipleLayers
 from demsmith.algorithms.base import file_of
 from demsmith.algorithms.parameters import add, tr
 
+COUNTS = (
+    ("VOIDS", "voids", "Voids found"),
+    ("CELLS_FILLED", "cells_filled", "Cells filled"),
+    ("CELLS_UNFILLED", "cells_unfilled", "Void cells left"),
+    ("CELLS_FAULTY", "cells_faulty", "Known cells that were removed and filled"),
+    ("LARGEST_VOID", "largest_void", "Cells of the largest void"),
+    ("SECONDS", "seconds", "Run time [s]"),
+)
+"""Outputs that count: name, field of the result, title."""
+
 
 def add_auxiliaries(tool):
     """Declare the rasters to fill from."""

@@ -18,8 +18,9 @@ from qgis.core import (
 from demsmith.algorithms import styling
 from demsmith.algorithms.base import file_of, help_picture
 from demsmith.algorithms.parameters import add, add_options, number, read_options, tr
-from demsmith.algorithms.reconstruction import add_auxiliaries, read_auxiliaries, tell
+from demsmith.algorithms.reconstruction import COUNTS, add_auxiliaries, read_auxiliaries, tell
 from demsmith.algorithms.source import CellTool
+from demsmith.algorithms.voidfilling import VoidFilling
 
 _HELP = """
 {picture}
@@ -38,17 +39,8 @@ and folder go on there. For processes on several cores or machines use the comma
 <i>demsmith mosaic</i>.</p>
 """
 
-_COUNTS = (
-    ("VOIDS", "voids", "Voids found"),
-    ("CELLS_FILLED", "cells_filled", "Cells filled"),
-    ("CELLS_UNFILLED", "cells_unfilled", "Void cells left"),
-    ("CELLS_FAULTY", "cells_faulty", "Known cells that were not believed"),
-    ("LARGEST_VOID", "largest_void", "Cells of the largest void"),
-    ("SECONDS", "seconds", "Run time [s]"),
-)
 
-
-class ReconstructMosaic(CellTool):
+class ReconstructMosaic(VoidFilling, CellTool):
     """Reconstruct tiles: `demsmith.core.mosaic.reconstruct_mosaic` in Processing."""
 
     def name(self):
@@ -58,14 +50,6 @@ class ReconstructMosaic(CellTool):
     def displayName(self):
         """Name the tool in the toolbox."""
         return tr("Reconstruct a mosaic")
-
-    def group(self):
-        """Name the tool's group in the toolbox."""
-        return tr("Void filling")
-
-    def groupId(self):
-        """Name the tool's group in ids."""
-        return "voids"
 
     def tags(self):
         """List words under which the tool is found."""
@@ -133,7 +117,7 @@ class ReconstructMosaic(CellTool):
         ))  # fmt: skip
         self.addOutput(QgsProcessingOutputHtml("REPORT", tr("Report")))
         self.addOutput(QgsProcessingOutputNumber("TILES", tr("Tiles")))
-        for name, _, title in _COUNTS:
+        for name, _, title in COUNTS:
             self.addOutput(QgsProcessingOutputNumber(name, tr(title)))
         self.addOutput(QgsProcessingOutputString("WARNINGS", tr("Warnings")))
 
@@ -175,7 +159,7 @@ class ReconstructMosaic(CellTool):
         if is_set("LOAD"):
             _load(result.vrt, "VRT", tr("Mosaic"), styling.style_terrain, context)
             _load(result.voids_layer, "VOIDS_LAYER", tr("Voids"), styling.style_voids, context)
-        outputs = {name: getattr(result, field) for name, field, _ in _COUNTS}
+        outputs = {name: getattr(result, field) for name, field, _ in COUNTS}
         outputs.update(
             OUTPUT=result.output, REPORT=result.report, TILES=len(result.tiles),
             WARNINGS="\n".join(result.warnings),

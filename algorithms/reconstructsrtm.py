@@ -13,14 +13,16 @@ from qgis.core import (
 from demsmith.algorithms import styling
 from demsmith.algorithms.base import help_picture
 from demsmith.algorithms.parameters import add, add_options, read_options, tr
-from demsmith.algorithms.reconstruction import add_auxiliaries, read_auxiliaries, tell
+from demsmith.algorithms.reconstruction import COUNTS, add_auxiliaries, read_auxiliaries, tell
 from demsmith.algorithms.source import BandTool
+from demsmith.algorithms.voidfilling import VoidFilling, add_cell_maps
 
 _HELP = """
 {picture}
 <p>Fills the voids of an SRTM tile or another elevation model, after it has removed what SRTM is
 known to get wrong, and tells of every cell where it comes from and how wrong it may be (in the
-picture: the redder, the more). All other cells keep their exact values.</p>
+picture: the redder, the more). All other cells keep their exact values; of those that are removed
+the report has a list.</p>
 <p><b>What is a void.</b> Cells with the band's nodata value, NaN, and the SRTM values -32768
 and -32767 even if the file does not name them as nodata. Add values, limits or a mask raster if
 your data mark voids otherwise. The layer's <i>additional no data values</i> in QGIS are not
@@ -38,15 +40,6 @@ is used. One that does not fit is refused, and the report says why.</p>
 <p><b>Neighbours.</b> Rasters of that folder on the same grid give the ground beyond the edges.</p>
 """
 
-_COUNTS = (
-    ("VOIDS", "voids", "Voids found"),
-    ("CELLS_FILLED", "cells_filled", "Cells filled"),
-    ("CELLS_UNFILLED", "cells_unfilled", "Void cells left"),
-    ("CELLS_FAULTY", "cells_faulty", "Known cells that were not believed"),
-    ("LARGEST_VOID", "largest_void", "Cells of the largest void"),
-    ("SECONDS", "seconds", "Run time [s]"),
-)
-
 _STYLES = {
     "OUTPUT": styling.style_terrain,
     "SOURCE_MAP": styling.style_source_map,
@@ -55,7 +48,7 @@ _STYLES = {
 }
 
 
-class ReconstructSrtm(BandTool):
+class ReconstructSrtm(VoidFilling, BandTool):
     """Reconstruct voids: `demsmith.core.reconstruction.reconstruct_file` in Processing."""
 
     def name(self):
@@ -65,14 +58,6 @@ class ReconstructSrtm(BandTool):
     def displayName(self):
         """Name the tool in the toolbox."""
         return tr("Reconstruct SRTM voids")
-
-    def group(self):
-        """Name the tool's group in the toolbox."""
-        return tr("Void filling")
-
-    def groupId(self):
-        """Name the tool's group in ids."""
-        return "voids"
 
     def tags(self):
         """List words under which the tool is found."""
@@ -110,14 +95,7 @@ class ReconstructSrtm(BandTool):
     def _declare_outputs(self):
         add(self, QgsProcessingParameterRasterDestination("OUTPUT", tr("Reconstructed")),
             help_text="GeoTIFF with the voids filled.")  # fmt: skip
-        add(self, QgsProcessingParameterRasterDestination(
-                "SOURCE_MAP", tr("Source map"), optional=True, createByDefault=False),
-            help_text="GeoTIFF that says of each cell where it comes from: 0 original, 2 a void "
-            "left as it was, others by what the cell was filled.")  # fmt: skip
-        add(self, QgsProcessingParameterRasterDestination(
-                "UNCERTAINTY", tr("Uncertainty"), optional=True, createByDefault=False),
-            help_text="GeoTIFF of the standard error to be expected in filled cells, 0 in known "
-            "ones. Method auto only.")  # fmt: skip
+        add_cell_maps(self)
         add(self, QgsProcessingParameterVectorDestination(
                 "VOIDS_LAYER", tr("Voids as polygons"),
                 QgsProcessing.SourceType.TypeVectorPolygon, optional=True, createByDefault=False),
@@ -128,7 +106,7 @@ class ReconstructSrtm(BandTool):
                 optional=True),
             help_text="Page with pictures and tables, and their numbers beside it in a JSON "
             "file; or the numbers alone.")  # fmt: skip
-        for name, _, title in _COUNTS:
+        for name, _, title in COUNTS:
             self.addOutput(QgsProcessingOutputNumber(name, tr(title)))
         self.addOutput(QgsProcessingOutputString("WARNINGS", tr("Warnings")))
 
@@ -156,7 +134,7 @@ class ReconstructSrtm(BandTool):
         for name, style in _STYLES.items():
             if paths[name]:
                 style(paths[name], context)
-        outputs = {name: getattr(result, field) for name, field, _ in _COUNTS}
+        outputs = {name: getattr(result, field) for name, field, _ in COUNTS}
         outputs.update((name, path) for name, path in paths.items() if path)
         outputs["WARNINGS"] = "\n".join(result.warnings)
         return outputs

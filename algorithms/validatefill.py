@@ -14,6 +14,7 @@ from qgis.core import (
 from demsmith.algorithms import styling
 from demsmith.algorithms.parameters import add, add_options, read_options, tr
 from demsmith.algorithms.source import BandTool
+from demsmith.algorithms.voidfilling import VoidFilling
 
 _HELP = """
 <p>Tells how wrong fills of this elevation model are. Known ground is hidden in artificial voids,
@@ -38,7 +39,7 @@ _COUNTS = (
 )
 
 
-class ValidateFill(BandTool):
+class ValidateFill(VoidFilling, BandTool):
     """Try fills on known ground: `demsmith.core.validation.validate_file` in Processing."""
 
     def name(self):
@@ -48,14 +49,6 @@ class ValidateFill(BandTool):
     def displayName(self):
         """Name the tool in the toolbox."""
         return tr("Validate void filling")
-
-    def group(self):
-        """Name the tool's group in the toolbox."""
-        return tr("Void filling")
-
-    def groupId(self):
-        """Name the tool's group in ids."""
-        return "voids"
 
     def tags(self):
         """List words under which the tool is found."""

@@ -4,6 +4,7 @@ Run it from anywhere: ``.venv/bin/python docs/make_pictures.py``, with names for
 ``presets thinned``. Ground is that of public SRTM tiles in ``../shared/data``.
 """
 
+import datetime
 import io
 import sys
 from pathlib import Path
@@ -18,6 +19,7 @@ from mcmd_samples import curve_errors  # noqa: E402
 from picture import relief  # noqa: E402, demo/picture.py
 
 import demsmith  # noqa: E402
+from demsmith.core import raster  # noqa: E402
 from demsmith.core.samples.presets import PRESETS  # noqa: E402
 from demsmith.core.validation import punch_voids  # noqa: E402
 
@@ -164,6 +166,60 @@ def roughness():
     return figure
 
 
+# --- drainage ------------------------------------------------------------------------------------
+
+
+def drainage():
+    """Draw a range's upstream area by two methods, and its streams by order."""
+    from matplotlib.collections import LineCollection
+
+    ground, sizes = tiles.void_free("sierra_nevada")
+    window = np.s_[880:1180, 700:1000]
+    cell = _cell(sizes, window)
+    blues = dict(cmap="Blues", vmin=3.8, vmax=8.5)
+    figure, axes = _panels(1, 3, width=3.6, aspect=1.25)
+    ways = {method: demsmith.drainage_area(ground, pixel_size=sizes, method=method)
+            for method in ("d8", "mfd")}  # fmt: skip
+    for axis, (method, drained) in zip(axes, ways.items(), strict=False):
+        _show(axis, drained.log()[window], f"upstream area: {method}", cell, **blues)
+    streams = ways["d8"].streams()
+    _show(axes[2], relief(ground[window], cell), "streams by Strahler's order", cell)
+    top_left = window[0].start, window[1].start
+    lines = np.split(streams.cells - top_left, streams.first_cell[1:-1])
+    axes[2].add_collection(LineCollection(
+        [line[:, ::-1] for line in lines], linewidths=0.5 * streams.order, colors="navy",
+        capstyle="round",
+    ))  # fmt: skip
+    axes[2].set(xlim=(-0.5, 299.5), ylim=(299.5, -0.5))
+    return figure
+
+
+# --- sunlight ------------------------------------------------------------------------------------
+
+
+def solar():
+    """Draw mountains in the light of a December day, its hours, and a morning's shadows."""
+    tile = raster.read(tiles.DATA / tiles.VOID_FREE["sierra_nevada"])
+    window = np.s_[850:1080, 480:800]
+    cell = _cell(tile.grid.pixel_size_m(), window)
+    day = datetime.date(2024, 12, 21)
+    light = demsmith.solar_irradiance(tile.values, grid=tile.grid, days=[day])
+    morning = datetime.datetime(2024, 12, 21, 8, 30, tzinfo=datetime.UTC)
+    shadow = demsmith.solar_irradiance(tile.values, grid=tile.grid, instant=morning).shadow
+    figure, axes = _panels(2, 2, width=4.4, aspect=0.88)
+    ground = relief(tile.values[window].astype(float), cell)
+    _show(axes[0], ground, "the ground", cell)
+    layers = (light.total / 1000, "21 December: light [kWh/m²]", "inferno"), (
+        light.hours, "21 December: hours of sun", "cividis",
+    )  # fmt: skip
+    for axis, (layer, title, colours) in zip(axes[1:], layers, strict=False):
+        _show(axis, layer[window], title, cell, cmap=colours)
+        figure.colorbar(axis.images[0], ax=axis, shrink=0.8, pad=0.01)
+    shaded = np.where(shadow[window][..., None], 0.35 * ground + np.array([0, 0, 0.12]), ground)
+    _show(axes[3], shaded, "21 December, 8:30 UTC: shadows", cell)
+    return figure
+
+
 def _cell(sizes, window):
     """Give the ground metres per cell in a window's middle, east-west and north-south."""
     return tuple(float(size[window[0]].mean()) for size in sizes)
@@ -183,8 +239,8 @@ def _panels(rows, columns, *, width, aspect=1.0):
     return figure, axes.ravel()
 
 
-def _show(axis, image, title, cell=(1, 1)):
-    axis.imshow(image, aspect=cell[1] / cell[0], interpolation="antialiased")
+def _show(axis, image, title, cell=(1, 1), **how):
+    axis.imshow(image, aspect=cell[1] / cell[0], interpolation="antialiased", **how)
     axis.set_title(title, fontsize=10)
     axis.set_axis_off()
 
@@ -208,6 +264,8 @@ PICTURES = {
     "curve": curve,
     "thinned": thinned,
     "roughness": roughness,
+    "solar": solar,
+    "drainage": drainage,
 }
 
 if __name__ == "__main__":

@@ -58,6 +58,9 @@ def pytest_addoption(parser, pluginmanager):
 
 
 def pytest_configure(config):
+    # Tests side by side are told of a terminal of 80 columns that they do not have.
+    for name in ("COLUMNS", "LINES"):
+        os.environ.pop(name, None)
     from hypothesis import settings
 
     # The first example of a kernel compiles it, and a busy machine is slow: no time limits. The

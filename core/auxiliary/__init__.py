@@ -1,6 +1,7 @@
 """Auxiliary elevation rasters: laid on the target, judged, and voids filled from them."""
 
 from demsmith.core.auxiliary.alignment import Alignment, align
+from demsmith.core.auxiliary.checking import check_auxiliary
 from demsmith.core.auxiliary.filling import (
     NOT_ASKED,
     REFUSED,
@@ -28,6 +29,7 @@ __all__ = [
     "Resampler",
     "Surface",
     "align",
+    "check_auxiliary",
     "fill_from_auxiliaries",
     "learn_surface",
     "open_auxiliary",

@@ -12,6 +12,10 @@ from demsmith.core.progress import SILENT, Span
 
 _SAMPLES = 60_000
 
+_SAME_SCALE = 0.05
+"""A vertical scale that differs by less does not spoil the shift."""
+
+_ROUNDS = 4
 
 _HEIGHTS = ("bias", "tilt_east", "tilt_north", "spread_before", "spread_after")
 
@@ -119,7 +123,8 @@ def align(windows, resampler, *, threads=None, progress=SILENT):
 
     First the horizontal shift (phase correlation in whole cells, then the least spread of the
     delta, by nlopt), then bias, tilt, vertical scale and difference in sharpness together, by a
-    robust regression whose terms are chosen by cross-validation; then a judgement of what is left.
+    robust regression whose terms are chosen by cross-validation; both again where the scale is
+    another than it was; then a judgement of what is left.
 
     Parameters
     ----------
@@ -150,10 +155,9 @@ def align(windows, resampler, *, threads=None, progress=SILENT):
     if not cells:
         return Alignment(False, "The auxiliary knows none of the ground it was compared on.")
     offset, laid = _coarse(windows, resampler, raw, threads, Span(progress, 0.2, 0.4))
-    fine = fine_shift(_pairs(windows, laid), progress=Span(progress, 0.4, 0.7))
-    offset = offset[0] + fine[0], offset[1] + fine[1]
-    laid = _laid(windows, resampler, offset, threads, Span(progress, 0.7, 0.85))
-    correction = _fitted(windows, laid)
+    offset, laid, correction = _fine(
+        windows, resampler, offset, laid, threads, Span(progress, 0.4, 0.85)
+    )
     aligned = _corrected(windows, laid, correction)
     after, cells = _spread(windows, aligned)
     likeness = compare(_pairs(windows, aligned), progress=Span(progress, 0.85, 1))
@@ -196,11 +200,30 @@ def _coarse(windows, resampler, raw, threads, progress):
     return (0.0, 0.0), raw
 
 
-def _pairs(windows, laid):
-    """Give elevations and known cells of target and auxiliary, window by window."""
+def _fine(windows, resampler, offset, laid, threads, progress):
+    """Give the shift, the auxiliary there, and its correction.
+
+    The shift and the vertical scale are each found right only where the other is: relief of a
+    third of the height fits best beside its place. So both are found anew until the scale stays.
+    """
+    correction = Correction()
+    for number in range(_ROUNDS):
+        part = Span(progress, number / _ROUNDS, (number + 1) / _ROUNDS)
+        pairs = _pairs(windows, laid, 1 + correction.scale)
+        more = fine_shift(pairs, progress=Span(part, 0, 0.7))
+        offset = offset[0] + more[0], offset[1] + more[1]
+        laid = _laid(windows, resampler, offset, threads, Span(part, 0.7, 1))
+        before, correction = correction, _fitted(windows, laid)
+        if abs(correction.scale - before.scale) <= _SAME_SCALE * (1 + before.scale):
+            break
+    return offset, laid, correction
+
+
+def _pairs(windows, laid, scale=1.0):
+    """Give elevations and known cells of target and scaled auxiliary, window by window."""
     inner = slice(MARGIN, -MARGIN)
     return [
-        (window.values, ~window.void, values[inner, inner], ~void[inner, inner])
+        (window.values, ~window.void, scale * values[inner, inner], ~void[inner, inner])
         for window, (values, void) in zip(windows, laid, strict=True)
     ]
 

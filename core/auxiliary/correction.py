@@ -72,13 +72,18 @@ class Correction:
     @property
     def shift(self):
         """Rows and columns by which the stencil moves the ground, its first moment."""
-        return tuple(float(each) for each in np.asarray(self.weights) @ self.taps)
+        return tuple(float(each) for each in self._shares @ self.taps)
 
     @property
     def variance(self):
         """Second moments of the stencil by row and column [cells²]: positive if it smooths."""
-        moments = np.asarray(self.weights) @ self.taps**2 - np.square(self.shift)
+        moments = self._shares @ self.taps**2 - np.square(self.shift)
         return tuple(float(each) for each in moments)
+
+    @property
+    def _shares(self):
+        """The stencil's weights as shares of the scaled ground that they are taken from."""
+        return np.asarray(self.weights) / (1 + self.scale)
 
     def apply(self, values, void, row, column):
         """Correct a window.

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from demsmith.core.mcmd.lattice import Lattice, metres
+from demsmith.core.mcmd.lattice import Lattice
+from demsmith.core.pixel_size import metres
 from demsmith.core.progress import SILENT, Span, checkpoint
 from demsmith.core.voids.labelling import find_voids
 

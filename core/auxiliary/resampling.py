@@ -16,6 +16,9 @@ _STEP = 16
 """Cells between places that are reprojected; in between they are interpolated. The Earth's
 curvature over 16 cells of 90 m moves a place by 4 cm."""
 
+_POINTS = 17
+"""Cells along each side of a grid by which its reach in another CRS is found."""
+
 _WIDEST = 4.0
 """Cells of the raster per target cell beyond which it is averaged in blocks first."""
 
@@ -86,6 +89,17 @@ class Resampler:
             self._resample(self._locate(rows, columns), values[strip], void[strip])
         values *= self.factor
         return values, void
+
+    def beneath(self):
+        """Give the rows and columns of the source under the grid: slices, or None for none."""
+        centres = [np.linspace(0, side - 1, _POINTS) for side in self.grid.shape]
+        places = self._project(np.stack(np.meshgrid(*centres), axis=-1).reshape(-1, 2))
+        cells = np.floor(places[np.isfinite(places).all(axis=1)] + 0.5)
+        if not cells.size:
+            return None
+        low = np.maximum(cells.min(axis=0), 0).astype(int)
+        high = np.minimum(cells.max(axis=0) + 1, self.source.grid.shape).astype(int)
+        return tuple(map(slice, low.tolist(), high.tolist())) if (low < high).all() else None
 
     @functools.cached_property
     def _ratios(self):

@@ -14,6 +14,10 @@ _OUTLIER, _LEAST_SPREAD = 10.0, 0.1
 """A delta beyond so many spreads is a fault of one of the two, and nothing to learn from; a
 spread below this [m] is that of two copies of the same."""
 
+_SHARES = np.array([0.01, 0.99, 0.0])
+"""Of each of `demsmith.core.voids.accurate.ESTIMATORS`, for the covariance alone; where a void is
+too large for it, the first has all."""
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -94,7 +98,21 @@ def learn_surface(windows, resampler, *, engine, threads=None, progress=SILENT):
     deltas = [_delta(window, resampler, alignment) for window in windows]
     known = [window for window in deltas if not window.void.all()]
     model = engine.learn(known, threads=threads, progress=Span(progress, 0.5, 1))
-    return Surface(resampler, alignment, model)
+    return Surface(resampler, alignment, _of_delta(model))
+
+
+def _of_delta(model):
+    """Have the delta filled by what is expected under its covariance, where trials speak for it.
+
+    A blend's shares are drawn towards those that are usual for ground. But the delta has no ridges
+    and valleys to go on: where the covariance alone did as well as the blend in artificial voids,
+    it did better in all others of real pairs. Voids too large for it are left to MCMD.
+    """
+    _, learned, _, blend = model.rmse.T
+    alone = model.tried.astype(bool) & (learned <= blend)
+    better = np.divide(learned, blend, out=np.ones_like(blend), where=alone & (blend > 0))
+    weights = np.where(alone[:, None], _SHARES, model.weights)
+    return replace(model, weights=weights, scale=model.scale * better)
 
 
 def _delta(window, resampler, alignment):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter
 
-from demsmith.core.cli.parameters import parameters
+from demsmith.core.cli.parameters import parameters, whole_number
 from demsmith.core.cli.progress import CommandProgress
 from demsmith.core.mcmd import MapFiles
 
@@ -65,7 +65,9 @@ class Cells:
     The fields are named as the parameters of `demsmith.core.raster.read`.
     """
 
-    band: Annotated[int, Parameter(group=SOURCE, help="Band to read, from 1.")] = 1
+    band: Annotated[
+        int, Parameter(group=SOURCE, converter=whole_number, help="Band to read, from 1.")
+    ] = 1
     nodata: Annotated[
         tuple[float, ...],
         Parameter(
@@ -123,6 +125,7 @@ class Run:
         int | None,
         Parameter(
             group=RUN,
+            converter=whole_number,
             show_default=lambda _: "one for each core",
             help="Threads to compute with; the result does not depend on it.",
         ),

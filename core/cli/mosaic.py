@@ -5,7 +5,8 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from demsmith.core.cli.common import RUN, VERB, Auxiliaries, Cells, Run
-from demsmith.core.cli.parameters import parameters
+from demsmith.core.cli.parameters import parameters, whole_number
+from demsmith.core.cli.reconstruct import told_of_cells
 from demsmith.core.errors import InputError
 from demsmith.core.mosaic import reconstruct_mosaic
 from demsmith.core.reconstruction import ReconstructOptions
@@ -52,6 +53,7 @@ def mosaic(
         int | None,
         Parameter(
             group=RUN,
+            converter=whole_number,
             show_default=lambda _: "one for each core",
             help="Processes side by side; 0: none but this one.",
         ),
@@ -85,7 +87,6 @@ def _summary(result):
     """Tell in a line what was done."""
     done = (
         f"filled {result.cells_filled} cells in {result.voids} voids of {len(result.tiles)} tiles"
+        f"{told_of_cells(result)}"
     )
-    if result.cells_unfilled:
-        done += f", left {result.cells_unfilled} cells"
     return f"{done} in {result.seconds:.1f} s -> {result.output}"

@@ -1,6 +1,7 @@
 """Command-line parameters made from an operation's options, which are defined in the core."""
 
 import dataclasses
+import math
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
@@ -41,6 +42,24 @@ def parameters(options_class, *, group, advanced):
     )  # fmt: skip
 
 
+def whole_number(_, tokens):
+    """Read one whole number; Cyclopts by itself would round any other.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    word = tokens[0].value
+    try:
+        number = float(word)
+    except ValueError:
+        number = math.nan
+    if not number.is_integer():
+        raise ValueError(f"'{word}' is no whole number")
+    return int(number)
+
+
 def flag(spec):
     """Give the word of an option on the command line.
 
@@ -64,6 +83,7 @@ def _annotation(spec, group):
             group=group,
             negative=_negative(spec),
             show_default=spec.kind is not bool and spec.default is not None,
+            converter=whole_number if spec.kind is int else None,
             help=_help(spec),
         ),
     ]

@@ -7,13 +7,16 @@ from cyclopts import App, Parameter
 from demsmith.core.cli.common import VERB, Auxiliaries, InputFile, OutputFile, Run, Source
 from demsmith.core.cli.parameters import parameters
 from demsmith.core.reconstruction import ReconstructOptions, reconstruct_file
+from demsmith.core.voids.sources import NEIGHBOUR, SOURCES
 
 _Options = parameters(ReconstructOptions, group=VERB, advanced=VERB)
 
 app = App(
     name="reconstruct",
     help_epilogue="""\
-Every known cell keeps its value. The source map says of each cell where it comes from.
+Known cells keep their values, but for spikes and wells, which are removed and filled too
+(--no-outliers leaves them); the report lists them. The source map says of each cell where it comes
+from.
 
 Examples:
   demsmith reconstruct N42E001.hgt filled.tif --neighbours tiles/ --report report.html
@@ -60,12 +63,25 @@ def reconstruct(
             mask=source.mask, threads=run.threads, overwrite=run.overwrite,
             creation_options=run.creation_option, progress=progress,
         )  # fmt: skip
-    run.tell(result, summary(result))
+    run.tell(result, _summary(result))
 
 
-def summary(result):
+def _summary(result):
     """Tell in a line what was done."""
-    done = f"filled {result.cells_filled} cells in {result.voids} voids"
+    done = f"filled {result.cells_filled} cells in {result.voids} voids{told_of_cells(result)}"
+    return f"{done} in {result.seconds:.1f} s -> {result.output}"
+
+
+def told_of_cells(result):
+    """Tell how many cells are from elsewhere than interpolation, were replaced, and left."""
+    told = [
+        f"{source.name}: {result.cells_by_source[source.name]}"
+        for source in SOURCES
+        if source.code >= NEIGHBOUR and source.name in result.cells_by_source
+    ]
+    done = f" ({', '.join(told)})" if told else ""
+    if result.cells_faulty:
+        done += f", {result.cells_faulty} of them known before and not believed"
     if result.cells_unfilled:
         done += f", left {result.cells_unfilled} cells"
-    return f"{done} in {result.seconds:.1f} s -> {result.output}"
+    return done

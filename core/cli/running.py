@@ -15,7 +15,10 @@ _VERBS = {
     "reconstruct": "Reconstruct the voids of SRTM and its like, with an error for every cell.",
     "mosaic": "Reconstruct a folder, list or VRT of tiles as one, seam-free.",
     "samples": "Make terrain from points, lines, contours, a sketch, or noise alone.",
+    "solar": "Compute the sunlight on terrain, with its shadows.",
     "thin": "Keep only the cells that carry the shape, or a random share.",
+    "drainage": "Tell how much ground drains through each cell, and find streams.",
+    "relief": "Make slope, aspect, hillshade, mean deviation or topographic position.",
     "validate": "Tell how wrong fills are, by artificial voids like the real ones.",
 }
 

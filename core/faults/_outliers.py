@@ -209,6 +209,49 @@ def mark_outliers(values, void, begin, end, usual, factor, least, rock, mask):
 
 
 @numba.njit(**_JIT)
+def keep_those_among_their_like(values, void, cells, mask):
+    """Unmark the outliers beside which what stays is much like them.
+
+    A tip of ground between voids may lie below all rays that have ground, and yet be the valley
+    that goes on under the void. So the neighbours that are known and not marked must lie, in the
+    median, at least a third of the step away, unless as many are marked: a cluster's inner cells
+    have no others.
+
+    Parameters
+    ----------
+    cells : (N, 2) int64 array
+        The marked ones.
+    mask : (H, W) bool array
+    """
+    alike = np.zeros(cells.shape[0], np.bool_)
+    for n in range(cells.shape[0]):
+        alike[n] = _among_its_like(values, void, mask, cells[n, 0], cells[n, 1])
+    for n in range(cells.shape[0]):
+        if alike[n]:
+            mask[cells[n, 0], cells[n, 1]] = False
+
+
+@numba.njit(**_JIT)
+def _among_its_like(values, void, mask, row, column):
+    height, width = values.shape
+    staying = np.empty(8)
+    count, marked = 0, 0
+    for k in range(8):
+        i, j = row + _DOWN[k], column + _RIGHT[k]
+        if not (0 <= i < height and 0 <= j < width) or void[i, j]:
+            continue
+        if mask[i, j]:
+            marked += 1
+        else:
+            staying[count] = values[i, j]
+            count += 1
+    if count <= marked:
+        return False
+    step, _, _ = _drop(values, void, row, column, 0.0, 0.0)
+    return abs(values[row, column] - np.median(staying[:count])) < abs(step) / 3
+
+
+@numba.njit(**_JIT)
 def mark_noisy(values, void, begin, end, usual, factor, rim, mask):
     """Mark the rim cells of some rows that lie far from the middle of their neighbours.
 

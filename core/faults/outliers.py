@@ -8,11 +8,11 @@ import numpy as np
 from demsmith.core import parallel
 from demsmith.core.elevations import checked
 from demsmith.core.faults.options import FaultOptions
-from demsmith.core.mcmd.lattice import metres
 from demsmith.core.options import options_from
+from demsmith.core.pixel_size import metres
 from demsmith.core.progress import SILENT, checkpoint
 
-REACH = 8
+REACH = 9
 """Whether a cell is an outlier depends on the ground within so many cells of it."""
 
 _BLOCK_ROWS = 128
@@ -87,6 +87,9 @@ def find_outliers(
     15 × 15 cells around, without the cluster, drawn towards the model's. Slopes, ridges, cliffs
     and shores have no such step on all sides, and summits have a small one.
 
+    A cell most of whose known neighbours stay, and are in the median less than a third of that step
+    away from it, is none: the ends of valleys and ridges between voids are such cells.
+
     Beside voids, rays step over one void cell; with fewer than eight rays ``outlier_factor`` grows
     by √(8 / rays), and cells with ground on fewer than five are not judged: a raster's corners are
     not. Where the rays end level, as in water, every pit is a well, and what rises is a rock unless
@@ -130,7 +133,7 @@ def find_outliers(
     >>> np.argwhere(find_outliers(z))
     array([[20, 20]])
     """
-    from demsmith.core.faults._outliers import mark_outliers
+    from demsmith.core.faults._outliers import keep_those_among_their_like, mark_outliers
 
     options = options_from(FaultOptions, options, parameters, "find_outliers()")
     values, void = checked(values, void)
@@ -142,6 +145,7 @@ def find_outliers(
         mark_outliers, values, void, model.roughness, factor, least, rock, mask,
         threads=threads, progress=progress,
     )  # fmt: skip
+    keep_those_among_their_like(values, void, np.argwhere(mask), mask)
     return mask
 
 

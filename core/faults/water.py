@@ -8,8 +8,8 @@ import numpy as np
 from demsmith.core import parallel
 from demsmith.core.elevations import checked
 from demsmith.core.faults.options import FaultOptions
-from demsmith.core.mcmd.lattice import metres
 from demsmith.core.options import options_from
+from demsmith.core.pixel_size import metres
 from demsmith.core.progress import SILENT
 
 WATER_REACH = 64

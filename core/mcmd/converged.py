@@ -15,8 +15,8 @@ from itertools import pairwise
 import numpy as np
 
 from demsmith.core import parallel
-from demsmith.core.mcmd.lattice import metres
 from demsmith.core.mcmd.relaxed import TENSION_CELLS
+from demsmith.core.pixel_size import metres
 from demsmith.core.progress import SILENT, Span, checkpoint
 
 STIFFNESS_CELLS = 0.7

@@ -10,8 +10,9 @@ import numpy as np
 from demsmith.core import parallel
 from demsmith.core.errors import InputError
 from demsmith.core.mcmd.displacement import Displacement
-from demsmith.core.mcmd.lattice import Lattice, metres
+from demsmith.core.mcmd.lattice import Lattice
 from demsmith.core.mcmd.maps import as_map
+from demsmith.core.pixel_size import metres
 from demsmith.core.progress import SILENT, Span, checkpoint
 
 _NOTHING_KNOWN = "no cell is known; MCMD needs at least one elevation, or displacements"

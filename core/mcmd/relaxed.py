@@ -14,7 +14,8 @@ from functools import partial
 import numpy as np
 
 from demsmith.core import parallel
-from demsmith.core.mcmd.lattice import Lattice, metres
+from demsmith.core.mcmd.lattice import Lattice
+from demsmith.core.pixel_size import metres
 from demsmith.core.progress import SILENT, Span, checkpoint
 
 FINEST_SWEEPS = 4

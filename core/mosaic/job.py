@@ -81,13 +81,13 @@ def reconstruct_mosaic(
     options = ReconstructOptions(**asdict(options or ReconstructOptions()))
     validate(options)
     refuse_uncertainty(options, uncertainty)
-    check_auxiliaries(auxiliaries, options)
     crew = _crew(workers, scheduler, threads)
     inputs = [inputs] if isinstance(inputs, (str, os.PathLike)) else inputs
     rules = raster.CellRules(band=band, nodata=tuple(nodata), below=below, above=above)
     tiles = raster.open_tiles(
         raster.tile_paths(*inputs), rules=rules, progress=Span(progress, 0, 0.03)
     )
+    check_auxiliaries(auxiliaries, options, tiles.grid, inputs=[tile.path for tile in tiles.tiles])
     layout = layout_of(
         tiles, os.fspath(folder), source_map=source_map, uncertainty=uncertainty,
         voids_layer=voids_layer,

@@ -1,6 +1,8 @@
 """What a mosaic made, all together: the virtual raster, the layer of voids, the report."""
 
+import os
 import time
+from collections import Counter
 from dataclasses import asdict, dataclass, fields
 
 import numpy as np
@@ -10,6 +12,7 @@ from demsmith.core import raster
 from demsmith.core.mosaic.views import load_view, view_step
 from demsmith.core.mosaic.workplace import load, load_facts
 from demsmith.core.reconstruction.parts import large_note
+from demsmith.core.reconstruction.removed import largest_changes
 from demsmith.core.reconstruction.report import auxiliary_rows, fault_rows
 from demsmith.core.reconstruction.table import tabulate
 from demsmith.core.report import Scene, reconstruction_report
@@ -129,12 +132,12 @@ def summarise(work, plan, extents, patches, written, large, begin):
         cells_by_source={
             source.name: int(counts[source.code]) for source in SOURCES if counts[source.code]
         },
-        cells_faulty=sum(each["faulty"] for each in facts),
+        cells_faulty=_faulty(facts).total(),
         auxiliaries=tuple(plan.alignments()),
         warnings=tuple(warnings),
         table=table,
     )
-    _write_report(work, plan, result, counts, written)
+    _write_report(work, plan, result, counts, written, facts)
     return result
 
 
@@ -154,6 +157,19 @@ def _row(facts):
     return {**paths, **counts, "cells_replaced": facts["replaced"]}
 
 
+def _faulty(facts):
+    """Count the known cells of all tiles that were not believed, by the reason."""
+    return sum((Counter(each["faulty"]) for each in facts), Counter())
+
+
+def _removed(facts):
+    """List the most changed of them, each with its tile."""
+    return largest_changes(
+        [{"tile": os.path.basename(each["input"]), **row} for row in each["removed"]]
+        for each in facts
+    )
+
+
 def _disagreement(facts):
     return (
         f"'{facts['input']}': {facts['replaced']} known cells are known otherwise by a tile that "
@@ -167,7 +183,7 @@ def _cell_counts(counts, replaced):
     return dict(cells_void=void, cells_filled=void - left, cells_unfilled=left)
 
 
-def _write_report(work, plan, result, counts, written):
+def _write_report(work, plan, result, counts, written, facts):
     report = reconstruction_report(
         facts={
             "Output": result.output,
@@ -181,7 +197,8 @@ def _write_report(work, plan, result, counts, written):
         scene=_scene(work.layout.tiles, plan, written),
         options=asdict(work.options),
         warnings=result.warnings,
-        faults=fault_rows(result.cells_faulty),
+        faults=fault_rows(_faulty(facts)),
+        removed=_removed(facts),
         auxiliaries=auxiliary_rows(result.auxiliaries),
         title="Reconstruction of a mosaic",
     )

@@ -26,8 +26,8 @@ def survey(tiles, rows, columns, path, *, threads=None, progress=SILENT):
 
 def scan(tiles, plan, rows, columns, path, *, threads=None, progress=SILENT):
     """Find the void cells of a chunk and save their runs."""
-    runs, cells = void_runs(tiles, plan, rows, columns, threads=threads, progress=progress)
-    save(path, runs=runs, cells=np.int64(cells))
+    found = void_runs(tiles, plan, rows, columns, threads=threads, progress=progress)
+    save(path, **found._asdict())
 
 
 def fill(tiles, plan, part, path, *, threads=None, progress=SILENT):
@@ -58,7 +58,7 @@ class TileOutputs:
     creation_options: tuple = ()
 
 
-def write(tiles, tile, patches, options, outputs, path, *, threads=None, progress=SILENT):
+def write(tiles, tile, patches, outliers, options, outputs, path, *, threads=None, progress=SILENT):
     """Put a tile together, write it, and save what is to be told of it.
 
     Parameters
@@ -67,6 +67,8 @@ def write(tiles, tile, patches, options, outputs, path, *, threads=None, progres
     tile : Tile
     patches : list of str
         Paths of those that may have cells in it.
+    outliers : (K, 2) int array
+        Rows and columns of the spikes and wells among these cells.
     options : ReconstructOptions
     outputs : TileOutputs
     path : str
@@ -76,7 +78,7 @@ def write(tiles, tile, patches, options, outputs, path, *, threads=None, progres
     own = raster.read(tile.path, **tiles.rules.as_dict(), progress=Span(progress, 0, 0.1))
     made = assemble(
         own, tiles, tile.rows, tile.columns, map(load_patch, patches),
-        float_output=options.float_output, progress=Span(progress, 0.1, 0.5),
+        outliers=outliers, float_output=options.float_output, progress=Span(progress, 0.1, 0.5),
     )  # fmt: skip
     os.makedirs(outputs.unfinished, exist_ok=True)
     unfinished = {
@@ -90,5 +92,8 @@ def write(tiles, tile, patches, options, outputs, path, *, threads=None, progres
     settle(outputs.unfinished, list(outputs.paths.values()))
     save_view(path, view_of(made, own, tile, tiles.shape))
     counts = np.bincount(made.sources.ravel(), minlength=256).tolist()
-    told = dict(replaced=made.replaced, faulty=made.faulty, notes=list(own.notes))
+    told = dict(
+        replaced=made.replaced, notes=list(own.notes), faulty=made.removed.counts(),
+        removed=made.removed.rows(own.grid),
+    )  # fmt: skip
     save_facts(path, {"input": tile.path, **outputs.paths, "counts": counts, **told})

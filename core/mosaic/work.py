@@ -11,6 +11,7 @@ from demsmith.core.mosaic.schedulers import Task
 from demsmith.core.mosaic.summary import summarise
 from demsmith.core.mosaic.workplace import Workplace, load
 from demsmith.core.progress import Span, checkpoint
+from demsmith.core.reconstruction.doubts import FoundVoids
 from demsmith.core.reconstruction.options import ReconstructOptions
 from demsmith.core.reconstruction.pipeline import divided, joined
 from demsmith.core.reconstruction.plan import make_plan
@@ -59,10 +60,10 @@ class Work:
             tiles, counts, self.options, auxiliaries=self.auxiliaries,
             progress=Span(progress, 0.05, 0.15),
         )  # fmt: skip
-        extents = self._find_voids(plan, chunks, Span(progress, 0.15, 0.25))
+        extents, outliers = self._find_voids(plan, chunks, Span(progress, 0.15, 0.25))
         parts, large = divided(tiles, plan, extents, np.arange(len(extents)), side)
         patches = self._fill(plan, parts, Span(progress, 0.25, 0.75))
-        written = self._write(extents, parts, patches, Span(progress, 0.75, 0.97))
+        written = self._write(extents, outliers, parts, patches, Span(progress, 0.75, 0.97))
         result = summarise(self, plan, extents, patches, written, large, begin)
         checkpoint(progress, 1.0)
         return result
@@ -83,8 +84,9 @@ class Work:
             for number, chunk in enumerate(chunks)
         ]
         results = self._run(found, Span(progress, 0, 0.8))
-        runs = [load(path, "runs", "cells") for path in results]
-        return joined(runs, progress=Span(progress, 0.8, 1))
+        chunks_found = [FoundVoids(**load(path)) for path in results]
+        outliers = np.concatenate([each.outliers for each in chunks_found])
+        return joined(chunks_found, progress=Span(progress, 0.8, 1)), outliers
 
     def _fill(self, plan, parts, progress):
         filled = [
@@ -96,7 +98,7 @@ class Work:
         ]  # fmt: skip
         return self._run(filled, progress)
 
-    def _write(self, extents, parts, patches, progress):
+    def _write(self, extents, outliers, parts, patches, progress):
         tiles = self.layout.tiles
         part_of = np.full(len(extents), -1)
         for number, part in enumerate(parts):
@@ -110,7 +112,8 @@ class Work:
             needed = [patches[part] for part in meeting[meeting >= 0]]
             written.append(
                 self._task(
-                    f"'{tile.path}'", tasks.write, (tiles, tile, needed, self.options, outputs),
+                    f"'{tile.path}'", tasks.write,
+                    (tiles, tile, needed, _within(outliers, tile), self.options, outputs),
                     f"tile-{number}.json",
                 )
             )  # fmt: skip
@@ -125,6 +128,13 @@ class Work:
         missing = [task for task in wanted if not os.path.exists(task.result)]
         self.crew.run(missing, stop=self.place.stop, progress=progress)
         return [task.result for task in wanted]
+
+
+def _within(places, tile):
+    """Give the places, by row and column, that lie in a tile."""
+    (row, column), (rows, columns) = places.T, (tile.rows, tile.columns)
+    inside = (row >= rows.start) & (row < rows.stop)
+    return places[inside & (column >= columns.start) & (column < columns.stop)]
 
 
 def _named(window):

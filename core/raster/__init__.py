@@ -1,15 +1,19 @@
 """Rasters on disk and in memory: reading, writing, and where their cells and voids are.
 
-And points and lines, as samples of elevations, read and written; outlines of voids, written.
+And points and lines, as samples of elevations, read and written; lines, and outlines of voids,
+written.
 
 The only package that meets GDAL, at first use: importing it needs none.
 """
 
 from demsmith.core.raster.features import Features
+from demsmith.core.raster.geographic import Places, north_up, places_of
 from demsmith.core.raster.grid import XY, Grid, PixelSize, Shape
+from demsmith.core.raster.lines import write_lines
 from demsmith.core.raster.outputs import (
     all_or_nothing,
     check_output,
+    check_outputs,
     check_place,
     whole_or_nothing,
 )
@@ -26,13 +30,14 @@ from demsmith.core.raster.tileset import (
     Tile,
     TileSet,
     elevations,
+    elevations_m,
     height_unit,
     open_tiles,
     shifted,
 )
 from demsmith.core.raster.vector import read_features
 from demsmith.core.raster.virtual import write_vrt
-from demsmith.core.raster.writing import Written, write
+from demsmith.core.raster.writing import Written, write, write_bands
 
 read_raster = read
 write_raster = write
@@ -44,6 +49,7 @@ __all__ = [
     "Features",
     "Grid",
     "PixelSize",
+    "Places",
     "Raster",
     "Shape",
     "Tile",
@@ -51,11 +57,15 @@ __all__ = [
     "Written",
     "all_or_nothing",
     "check_output",
+    "check_outputs",
     "check_place",
     "check_rows_output",
     "elevations",
+    "elevations_m",
     "height_unit",
+    "north_up",
     "open_tiles",
+    "places_of",
     "polygons_of",
     "read",
     "read_features",
@@ -68,6 +78,8 @@ __all__ = [
     "tile_paths",
     "whole_or_nothing",
     "write",
+    "write_bands",
+    "write_lines",
     "write_points",
     "write_polygons",
     "write_raster",

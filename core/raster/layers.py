@@ -1,6 +1,8 @@
-"""Writing vector layers, whole or not at all: what points and polygons share."""
+"""Writing vector layers, whole or not at all: what points, lines and polygons share."""
 
 import os
+
+import numpy as np
 
 from demsmith.core.errors import InputError, OutputError
 from demsmith.core.raster._gdal import load, session
@@ -64,6 +66,53 @@ def _refuse_nameless_crs(crs, path, extensions):
             return
     others = " or ".join(extension for extension in extensions if extension != ".geojson")
     raise InputError(f"'{path}': GeoJSON cannot tell a CRS without an EPSG code; write {others}")
+
+
+def as_columns(columns, count, what):
+    """Give attributes as arrays by name, each with a value for every feature.
+
+    Parameters
+    ----------
+    columns : mapping of str to array_like, shape (count,)
+        Of integer, real, bool or text type.
+    count : int
+        Number of features.
+    what : str
+        Their name in the plural, for messages.
+
+    Raises
+    ------
+    InputError
+        If a column has another length.
+    """
+    columns = {name: np.asarray(column) for name, column in columns.items()}
+    for name, column in columns.items():
+        if column.shape != (count,):
+            raise InputError(f"attribute '{name}' must have a value for each of {count} {what}")
+    return columns
+
+
+def fields_of(columns):
+    """Describe attributes, as `as_columns` gives them, by the types of their arrays."""
+    return [_field(name, column.dtype.kind) for name, column in columns.items()]
+
+
+def _field(name, kind):
+    ogr = load().ogr
+    kinds = {"b": ogr.OFTInteger, "i": ogr.OFTInteger64, "u": ogr.OFTInteger64, "f": ogr.OFTReal}
+    field = ogr.FieldDefn(name, kinds.get(kind, ogr.OFTString))
+    if kind == "b":
+        field.SetSubType(ogr.OFSTBoolean)
+    return field
+
+
+def attributes(columns, count):
+    """Yield the attributes of each of ``count`` features as a list, ``None`` for NaN."""
+    columns = [column.tolist() for column in columns.values()]
+    for feature in range(count):
+        values = (column[feature] for column in columns)
+        # NaN is the only value that is not itself.
+        yield [value if value == value else None for value in values]
 
 
 def write_layer(path, geometry_type, fields, features, *, crs=""):

@@ -61,6 +61,36 @@ def check_place(path, *, inputs=(), overwrite=False):
         raise OutputError(f"cannot write '{path}': folder '{folder}' is not writable")
 
 
+def check_outputs(paths, *, inputs=(), overwrite=False):
+    """As `check_output`, for the GeoTIFFs of one run: also, no two may be the same file.
+
+    Parameters
+    ----------
+    paths : dict
+        By name; None for an output that is not wanted.
+    inputs, overwrite
+        As in `check_output`.
+
+    Returns
+    -------
+    dict
+        The paths as text.
+
+    Raises
+    ------
+    InputError, OutputError
+        As `check_output` does.
+    """
+    paths = {name: os.fspath(path) if path else None for name, path in paths.items()}
+    places = set()
+    for path in filter(None, paths.values()):
+        check_output(path, inputs=inputs, overwrite=overwrite)
+        if os.path.realpath(path) in places:
+            raise InputError(f"two outputs are '{path}'; give each a name of its own")
+        places.add(os.path.realpath(path))
+    return paths
+
+
 def _refuse_input(path, inputs):
     if not os.path.exists(path):
         return

@@ -4,10 +4,15 @@ import os
 
 import numpy as np
 
-from demsmith.core.errors import InputError
 from demsmith.core.progress import SILENT, checkpoint
 from demsmith.core.raster._gdal import load, session
-from demsmith.core.raster.layers import check_layer_output, write_layer
+from demsmith.core.raster.layers import (
+    as_columns,
+    attributes,
+    check_layer_output,
+    fields_of,
+    write_layer,
+)
 from demsmith.core.raster.outputs import whole_or_nothing
 
 # Voids that are outlined at once, and cells of the smallest raster that holds these.
@@ -72,8 +77,7 @@ def write_polygons(path, voids, grid, columns, *, overwrite=False, progress=SILE
     Raises
     ------
     InputError
-        As `demsmith.core.raster.layers.check_layer_output`, or if a column has another length
-        than there are voids.
+        As `demsmith.core.raster.layers.check_layer_output` and `as_columns`.
     OutputError
         If the file cannot be written there, or not to its end.
     Cancelled
@@ -81,14 +85,11 @@ def write_polygons(path, voids, grid, columns, *, overwrite=False, progress=SILE
     """
     path = os.fspath(path)
     check_layer_output(path, crs=grid.crs, overwrite=overwrite)
-    columns = {name: np.asarray(column) for name, column in columns.items()}
-    for name, column in columns.items():
-        if column.shape != (len(voids),):
-            raise InputError(f"attribute '{name}' must have a value for each of {len(voids)} voids")
+    columns = as_columns(columns, len(voids), "voids")
     with whole_or_nothing(path) as unfinished:
         write_layer(
-            unfinished, load().ogr.wkbPolygon, [_field(*column) for column in columns.items()],
-            _features(voids, grid, columns.values(), progress), crs=grid.crs,
+            unfinished, load().ogr.wkbPolygon, fields_of(columns),
+            _features(voids, grid, columns, progress), crs=grid.crs,
         )  # fmt: skip
         checkpoint(progress, 1.0)
     return path
@@ -156,22 +157,10 @@ def _polygonized(numbers, geotransform):
         ]
 
 
-def _field(name, column):
-    """Describe an attribute by the type of its column."""
-    ogr = load().ogr
-    kinds = {"b": ogr.OFTInteger, "i": ogr.OFTInteger64, "u": ogr.OFTInteger64, "f": ogr.OFTReal}
-    field = ogr.FieldDefn(name, kinds.get(column.dtype.kind, ogr.OFTString))
-    if column.dtype.kind == "b":
-        field.SetSubType(ogr.OFSTBoolean)
-    return field
-
-
 def _features(voids, grid, columns, progress):
     ogr = load().ogr
-    columns = [column.tolist() for column in columns]
-    for void, outline in enumerate(polygons_of(voids, grid)):
+    outlines = zip(polygons_of(voids, grid), attributes(columns, len(voids)), strict=True)
+    for void, (outline, values) in enumerate(outlines):
         if void % _MOST_VOIDS == 0:
             checkpoint(progress, void / len(voids))
-        values = (column[void] for column in columns)
-        # NaN is the only value that is not itself.
-        yield ogr.CreateGeometryFromWkb(outline), [v if v == v else None for v in values]
+        yield ogr.CreateGeometryFromWkb(outline), values

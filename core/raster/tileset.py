@@ -94,10 +94,7 @@ class TileSet:
     @property
     def dtype(self):
         """The float type that holds the elevations of every tile, or nearly."""
-        small = all(
-            tile.meta.dtype == np.float32 or (tile.meta.dtype.itemsize <= 2) for tile in self.tiles
-        )
-        return np.dtype(np.float32 if small else np.float64)
+        return max(_float_type(tile.meta.dtype) for tile in self.tiles)
 
     @property
     def unit(self):
@@ -168,6 +165,35 @@ def elevations(raster, dtype):
     if (meta.scale, meta.offset) == (1, 0):
         return raster.values.astype(dtype)
     return meta.real(raster.values.astype(np.float64)).astype(dtype)
+
+
+def elevations_m(raster):
+    """Give a raster's elevations in metres, taken for metres if neither band nor CRS tells.
+
+    Returns
+    -------
+    (rows, columns) array
+        float32 where that holds what the band's data type can, else float64. Voids hold anything.
+
+    Examples
+    --------
+    >>> from demsmith.core.raster import Grid, Raster
+    >>> feet = BandMeta(np.dtype(np.int16), unit="ft")
+    >>> values = np.array([[1000, 2000]], np.int16)
+    >>> elevations_m(Raster(values, values < 0, Grid((1, 2)), feet))
+    array([[304.8, 609.6]], dtype=float32)
+    """
+    dtype = _float_type(raster.meta.dtype)
+    unit = height_unit(raster.meta, raster.grid.crs)
+    if unit in (None, 1.0):
+        return elevations(raster, dtype)
+    return (elevations(raster, np.float64) * unit).astype(dtype, copy=False)
+
+
+def _float_type(dtype):
+    """Give the float type that holds another one's values, or nearly."""
+    small = dtype == np.float32 or dtype.itemsize <= 2
+    return np.dtype(np.float32 if small else np.float64)
 
 
 def open_tiles(paths, *, rules=None, progress=SILENT):

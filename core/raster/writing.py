@@ -1,4 +1,4 @@
-"""Writing a band as GeoTIFF, with all that its input said, whole or not at all."""
+"""Writing bands as GeoTIFF, with all that their input said, whole or not at all."""
 
 import os
 from typing import NamedTuple
@@ -18,6 +18,8 @@ SAME = object()
 
 _BLOCK_CELLS = 1 << 21
 _COLORED = (np.dtype(np.uint8), np.dtype(np.uint16))
+# Bands that come one after another are written one after another.
+_BY_BAND = ("INTERLEAVE=BAND",)
 
 
 class Written(NamedTuple):
@@ -29,8 +31,8 @@ class Written(NamedTuple):
 
 def write(
     path, values, *, like, void=None, dtype=None, nodata=SAME, overwrite=False,
-    creation_options=(), description=None, same_quantity=True, color_table=None, categories=(),
-    threads=None, progress=SILENT,
+    creation_options=(), description=None, unit="", same_quantity=True, color_table=None,
+    categories=(), threads=None, progress=SILENT,
 ):  # fmt: skip
     """Write values as a one-band GeoTIFF, tiled and compressed, with the input's properties.
 
@@ -59,6 +61,8 @@ def write(
         GDAL's for GeoTIFF, ``KEY=VALUE``; they win over ours.
     description : str
         Name of the band; the input's if not given.
+    unit : str
+        Unit of values that are of another kind than the input's.
     same_quantity : bool
         Whether the values are of the kind of the input's: then its unit, scale, offset, colours
         and band metadata are kept. Not so for a source map, whose colours are given.
@@ -88,18 +92,61 @@ def write(
     check_output(path, inputs=[like.source] if like.source else [], overwrite=overwrite)
     dtype = np.dtype(like.meta.dtype if dtype is None else dtype)
     _check_values(values, void, like, dtype)
-    meta = _output_meta(like.meta, dtype, description, same_quantity, color_table, categories)
+    meta = _output_meta(like.meta, dtype, description, unit, same_quantity, color_table, categories)
     blocks = _Blocks(values, void, dtype)
     tag = _nodata_tag(like.meta.nodata if nodata is SAME else nodata, blocks)
     options = complete_options(dtype, creation_options, threads=threads)
-    with whole_or_nothing(path) as unfinished:
-        with session() as heard:
-            _write_dataset(unfinished, blocks, tag, like.grid, meta, options, heard, progress)
-            # The closed dataset has written its last bytes: now a full disk is known.
-            if heard.failures:
-                raise cannot_write(path, heard.reason)
-        checkpoint(progress, 1.0)
+    _write_file(path, [blocks], [meta], tag, like.grid, options, progress)
     return Written(path, tag)
+
+
+def write_bands(
+    path, layers, *, like, descriptions, nodata, void=None, unit="", overwrite=False,
+    creation_options=(), threads=None, progress=SILENT,
+):  # fmt: skip
+    """Write layers of one quantity, another than the input's, as the bands of a float32 GeoTIFF.
+
+    Parameters
+    ----------
+    path, like, overwrite, creation_options, threads, progress
+        As in `write`.
+    layers : iterable of ndarray, shape (rows, columns)
+        One for each band. Each is written before the next is asked for, so that they need not
+        be in memory together.
+    descriptions : sequence of str
+        Names of the bands.
+    nodata : float
+        The bands' nodata tag, which no other cell must have.
+    void : ndarray of bool, shape (rows, columns)
+        Cells written as nodata in every band.
+    unit : str
+        Unit of the values.
+
+    Returns
+    -------
+    Written
+
+    Raises
+    ------
+    InputError, OutputError, Cancelled
+        As `write` does.
+    """
+    path = os.fspath(path)
+    check_output(path, inputs=[like.source] if like.source else [], overwrite=overwrite)
+    dtype = np.dtype(np.float32)
+    metas = [
+        _output_meta(like.meta, dtype, description, unit, False, None, ())
+        for description in descriptions
+    ]
+    options = complete_options(dtype, [*_BY_BAND, *creation_options], threads=threads)
+    blocks = (_checked_blocks(layer, void, like, dtype) for layer in layers)
+    _write_file(path, blocks, metas, float(nodata), like.grid, options, progress)
+    return Written(path, float(nodata))
+
+
+def _checked_blocks(values, void, like, dtype):
+    _check_values(values, void, like, dtype)
+    return _Blocks(values, void, dtype)
 
 
 class _Blocks:
@@ -165,12 +212,13 @@ def _check_values(values, void, like, dtype):
             )
 
 
-def _output_meta(meta, dtype, description, same_quantity, color_table, categories):
+def _output_meta(meta, dtype, description, unit, same_quantity, color_table, categories):
     """Properties of the output: the input's, as far as they still hold."""
     kept = {
         name: getattr(meta, name)
         for name in ("area_or_point", "dataset_metadata", "epoch", "gcps", "gcp_crs", "rpc")
     }
+    kept["unit"] = unit
     if same_quantity:
         for name in (
             "scale", "offset", "unit", "description", "band_metadata", "color_table", "categories",
@@ -214,30 +262,46 @@ def _plain(tag):
     return None if tag is None else tag.item()
 
 
-def _write_dataset(path, blocks, tag, grid, meta, options, heard, progress):
+def _write_file(path, layers, metas, tag, grid, options, progress):
+    """Write layers of blocks, each with its band's properties, whole or not at all."""
+    with whole_or_nothing(path) as unfinished:
+        with session() as heard:
+            _write_dataset(unfinished, layers, metas, tag, grid, options, heard, progress)
+            # The closed dataset has written its last bytes: now a full disk is known.
+            if heard.failures:
+                raise cannot_write(path, heard.reason)
+        checkpoint(progress, 1.0)
+
+
+def _write_dataset(path, layers, metas, tag, grid, options, heard, progress):
     gdal = load().gdal
-    kind, needed = gdal_type(meta.dtype)
+    kind, needed = gdal_type(metas[0].dtype)
     rows, columns = grid.shape
     driver = gdal.GetDriverByName("GTiff")
-    dataset = heard.attempt(driver.Create, path, columns, rows, 1, kind, options + needed)
+    dataset = heard.attempt(
+        driver.Create, path, columns, rows, len(metas), kind, options + needed
+    )  # fmt: skip
     band = None
     try:
         _refuse_wrong_options(heard)
         if dataset is None:
             return
-        band = dataset.GetRasterBand(1)
-        heard.attempt(_describe, dataset, band, tag, grid, meta)
-        for strip in blocks.strips(band.GetBlockSize()[1]):
-            block = blocks.final(strip, tag)
-            heard.attempt(
-                band.WriteRaster, 0, strip.start, columns, block.shape[0], block,
-                columns, block.shape[0], kind,
-            )  # fmt: skip
-            # Compress now, where cancelling is heard, and not everything on closing.
-            heard.attempt(band.FlushCache)
-            if heard.failures:
-                return
-            checkpoint(progress, strip.stop / rows)
+        heard.attempt(_describe, dataset, grid, metas[0])
+        for number, meta in enumerate(metas, start=1):
+            heard.attempt(_describe_band, dataset.GetRasterBand(number), tag, meta)
+        for number, blocks in enumerate(layers):
+            band = dataset.GetRasterBand(number + 1)
+            for strip in blocks.strips(band.GetBlockSize()[1]):
+                block = blocks.final(strip, tag)
+                heard.attempt(
+                    band.WriteRaster, 0, strip.start, columns, block.shape[0], block,
+                    columns, block.shape[0], kind,
+                )  # fmt: skip
+                # Compress now, where cancelling is heard, and not everything on closing.
+                heard.attempt(band.FlushCache)
+                if heard.failures:
+                    return
+                checkpoint(progress, (number + strip.stop / rows) / len(metas))
         heard.attempt(dataset.FlushCache)
     finally:
         # An exception's traceback would keep the file open, and have it written to later.
@@ -251,8 +315,8 @@ def _refuse_wrong_options(heard):
             raise InputError(f"creation option refused: {warning}")
 
 
-def _describe(dataset, band, tag, grid, meta):
-    """Set all that goes before the values."""
+def _describe(dataset, grid, meta):
+    """Set what holds for all bands and goes before the values."""
     gdal, osr = load().gdal, load().osr
     if meta.dataset_metadata:
         dataset.SetMetadata(meta.dataset_metadata)
@@ -272,6 +336,10 @@ def _describe(dataset, band, tag, grid, meta):
         if meta.epoch:
             reference.SetCoordinateEpoch(meta.epoch)
         dataset.SetSpatialRef(reference)
+
+
+def _describe_band(band, tag, meta):
+    """Set what goes before a band's values."""
     if meta.color_table:
         band.SetRasterColorTable(_gdal_color_table(meta.color_table))
     if meta.categories:

@@ -88,11 +88,11 @@ def reconstruct(
     (True, 6)
     """
     options = options_from(ReconstructOptions, options, parameters, "reconstruct")
-    check_auxiliaries(auxiliaries, options)
     values, void = checked(values, void)
     grid = grid or Grid(values.shape)
     if tuple(grid.shape) != values.shape:
         raise InputError(f"the grid has {tuple(grid.shape)} cells, values {values.shape}")
+    check_auxiliaries(auxiliaries, options, grid)
     raster = Raster(values, void, grid, BandMeta(dtype=values.dtype))
     around = alone(raster)
     done = reconstruct_ground(
@@ -101,7 +101,7 @@ def reconstruct(
     )  # fmt: skip
     made = assemble(
         raster, around.ground, around.rows, around.columns, done.patches,
-        float_output=options.float_output, progress=Span(progress, 0.9, 1),
+        outliers=done.outliers, float_output=options.float_output, progress=Span(progress, 0.9, 1),
     )  # fmt: skip
     table = tabulate(done.plan, done.extents, done.voids, done.patches, grid)
     return Reconstruction(made.values, made.left, made.sources, made.sigma, table)

@@ -6,6 +6,7 @@ import numpy as np
 
 from demsmith.core.progress import SILENT, Span, checkpoint
 from demsmith.core.raster import elevations
+from demsmith.core.reconstruction.removed import RemovedCells, removed_cells
 from demsmith.core.voids.sources import LEFT, NEIGHBOUR, ORIGINAL
 
 
@@ -27,7 +28,7 @@ class Assembled:
     replaced : int
         Known cells that another tile, which comes first, knows otherwise, and which were given
         that one's elevation.
-    faulty : int
+    removed : RemovedCells
         Known cells that were not believed, and filled.
     """
 
@@ -36,10 +37,12 @@ class Assembled:
     sources: np.ndarray
     sigma: np.ndarray
     replaced: int
-    faulty: int
+    removed: RemovedCells
 
 
-def assemble(own, ground, rows, columns, patches, *, float_output=False, progress=SILENT):
+def assemble(
+    own, ground, rows, columns, patches, *, outliers=(), float_output=False, progress=SILENT
+):
     """Put a tile together.
 
     Parameters
@@ -51,6 +54,8 @@ def assemble(own, ground, rows, columns, patches, *, float_output=False, progres
     rows, columns : slice
         Where the tile lies in it.
     patches : iterable of Patch
+    outliers : (K, 2) int array
+        Rows and columns of the ground's spikes and wells, of this tile and of others.
     float_output : bool
         Whether to give floating point whatever the tile's data type.
     progress : Progress
@@ -84,8 +89,9 @@ def assemble(own, ground, rows, columns, patches, *, float_output=False, progres
     values[changed] = stored(real[changed], own.meta, values.dtype)
     faulty = changed & ~own.void & (sources != NEIGHBOUR)
     checkpoint(progress, 1.0)
-    counts = (int(np.count_nonzero(cells)) for cells in (replaced, faulty))
-    return Assembled(values, left, sources, sigma, *counts)
+    here = _within(np.reshape(outliers, (-1, 2)), rows, columns)
+    removed = removed_cells(own, values, faulty, here)
+    return Assembled(values, left, sources, sigma, int(np.count_nonzero(replaced)), removed)
 
 
 def stored(real, meta, dtype):
@@ -120,6 +126,13 @@ def _differ(own, real):
     if own.meta.dtype.kind in "iu" and differ.any():
         differ[differ] = stored(real[differ], own.meta, own.meta.dtype) != own.values[differ]
     return differ
+
+
+def _within(places, rows, columns):
+    """Give the places that lie in a window, counted from its first cell."""
+    corner = np.array([rows.start, columns.start])
+    inside = (places >= corner) & (places < [rows.stop, columns.stop])
+    return (places - corner)[inside.all(axis=1)].astype(np.int64)
 
 
 def _output_type(dtype, float_output):

@@ -1,10 +1,30 @@
 """Which cells are to be filled: voids, and known cells that are not believed."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from demsmith.core.faults import REACH, find_outliers, find_untrusted_rims
 from demsmith.core.progress import SILENT, Span
 from demsmith.core.reconstruction.extents import scan
+
+
+class FoundVoids(NamedTuple):
+    """What is to be filled of a chunk.
+
+    Attributes
+    ----------
+    runs : (N, 3) int32 array
+        Its cells, see `demsmith.core.reconstruction.extents.scan`.
+    cells : int
+        Cells of the chunk that belong to the ground.
+    outliers : (K, 2) int32 array
+        Rows and columns of the spikes and wells among those to fill.
+    """
+
+    runs: np.ndarray
+    cells: int
+    outliers: np.ndarray
 
 
 def void_runs(ground, plan, rows, columns, *, threads=None, progress=SILENT):
@@ -21,10 +41,7 @@ def void_runs(ground, plan, rows, columns, *, threads=None, progress=SILENT):
 
     Returns
     -------
-    runs : (N, 3) int32 array
-        See `demsmith.core.reconstruction.extents.scan`.
-    cells : int
-        Cells of the chunk that belong to the ground.
+    FoundVoids
 
     Raises
     ------
@@ -44,9 +61,12 @@ def void_runs(ground, plan, rows, columns, *, threads=None, progress=SILENT):
     values, void = ground.read(*around, progress=Span(progress, 0, 0.3))
     covered = ground.covered(*around)
     pixel_size = tuple(size[around[0]] for size in plan.pixel_size)
-    doubted = _doubted(values, void, covered, plan, pixel_size, threads, Span(progress, 0.3, 1))
-    wanted = ((void & covered) | doubted)[inner]
-    return scan(wanted, rows, columns), int(np.count_nonzero(covered[inner]))
+    doubting = Span(progress, 0.3, 1)
+    outliers, rims = _doubted(values, void, covered, plan, pixel_size, threads, doubting)
+    wanted = ((void & covered) | outliers | rims)[inner]
+    corner = np.array([rows.start, columns.start])
+    places = (np.argwhere(outliers[inner]) + corner).astype(np.int32)
+    return FoundVoids(scan(wanted, rows, columns), int(np.count_nonzero(covered[inner])), places)
 
 
 def outliers_of(window, plan, *, threads=None):
@@ -60,23 +80,23 @@ def outliers_of(window, plan, *, threads=None):
 
 
 def _doubted(values, void, covered, plan, pixel_size, threads, progress):
-    """Find the known cells of a window that are not believed."""
+    """Find the known cells of a window that are not believed: outliers, and others at rims."""
     options = plan.options
-    doubted = np.zeros(void.shape, bool)
+    outliers, rims = np.zeros((2, *void.shape), bool)
     if options.outliers:
-        doubted = find_outliers(
+        outliers = find_outliers(
             values, void, options=options, model=plan.faults, pixel_size=pixel_size,
             unit=plan.unit, threads=threads, progress=Span(progress, 0, 0.7),
         )  # fmt: skip
     if options.noisy_rims or options.erode:
-        holes = (void & covered) | doubted
+        holes = (void & covered) | outliers
         rims = find_untrusted_rims(
-            values, void | doubted, options=options, model=plan.faults, threads=threads,
+            values, void | outliers, options=options, model=plan.faults, threads=threads,
             progress=Span(progress, 0.7, 1),
         )  # fmt: skip
         # The edge of all tiles is no void's rim.
-        doubted |= rims & _near(holes, max(options.erode, 1))
-    return doubted
+        rims &= _near(holes, max(options.erode, 1))
+    return outliers, rims
 
 
 def _reach(options):

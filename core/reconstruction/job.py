@@ -139,14 +139,14 @@ def reconstruct_file(
     options = options or ReconstructOptions()
     validate(options)
     refuse_uncertainty(options, uncertainty)
-    check_auxiliaries(auxiliaries, options)
+    grid = raster.read_header(input, band=band)[0]
+    others = check_auxiliaries(auxiliaries, options, grid, inputs=[input])
     wanted = dict(
         output=output, source_map=source_map, uncertainty=uncertainty, voids_layer=voids_layer,
         report=report,
     )  # fmt: skip
-    inputs = [path for path in (input, mask, *auxiliaries) if path is not None]
-    crs = raster.read_header(input, band=band)[0].crs if voids_layer else ""
-    paths = check_outputs(wanted, inputs=inputs, overwrite=overwrite, crs=crs)
+    inputs = [path for path in (input, mask, *others) if path is not None]
+    paths = check_outputs(wanted, inputs=inputs, overwrite=overwrite, crs=grid.crs)
     rules = raster.CellRules(band=band, nodata=nodata, below=below, above=above)
     own = raster.read(input, **rules.as_dict(), mask=mask, progress=Span(progress, 0, 0.05))
     around = alone(own)
@@ -181,8 +181,8 @@ def _reconstruct(own, around, options, auxiliaries, threads, progress):
         progress=Span(progress, 0, 0.9),
     )  # fmt: skip
     made = assemble(
-        own, around.ground, *window, done.patches, float_output=options.float_output,
-        progress=Span(progress, 0.9, 1),
+        own, around.ground, *window, done.patches, outliers=done.outliers,
+        float_output=options.float_output, progress=Span(progress, 0.9, 1),
     )  # fmt: skip
     return done, made
 
@@ -207,7 +207,7 @@ def _result(own, around, done, made, paths):
         cells_by_source={
             source.name: int(counts[source.code]) for source in SOURCES if counts[source.code]
         },
-        cells_faulty=made.faulty,
+        cells_faulty=made.removed.row.size,
         auxiliaries=tuple(done.plan.alignments()),
         neighbours=around.neighbours,
         warnings=tuple(_warnings(own, around, done, paths.get("uncertainty"))),

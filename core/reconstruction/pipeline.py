@@ -30,6 +30,8 @@ class Reconstructed:
     patches : tuple of Patch
     large : (N,) int64 array
         Those that were left because they need more ground in memory than can be promised.
+    outliers : (K, 2) int32 array
+        Rows and columns of the spikes and wells that are voids now.
     """
 
     plan: Plan
@@ -37,6 +39,7 @@ class Reconstructed:
     voids: np.ndarray
     patches: tuple
     large: np.ndarray
+    outliers: np.ndarray
 
 
 def reconstruct_ground(
@@ -88,7 +91,8 @@ def reconstruct_ground(
         fill_part(ground, plan, part, threads=threads, progress=progress)
         for part, progress in zip(parts, filling, strict=True)
     ]
-    return Reconstructed(plan, extents, voids, tuple(patches), large)
+    outliers = np.concatenate([each.outliers for each in found])
+    return Reconstructed(plan, extents, voids, tuple(patches), large, outliers)
 
 
 def _shared(progress, count):
@@ -113,7 +117,7 @@ def joined(found, *, progress=SILENT):
 
     Parameters
     ----------
-    found : list of (runs, int)
+    found : list of FoundVoids
     progress : Progress
 
     Returns
@@ -125,7 +129,7 @@ def joined(found, *, progress=SILENT):
     InputError
         If nothing is known.
     """
-    extents = connect([runs for runs, _ in found], progress=progress)
-    if extents.cells.sum() == sum(cells for _, cells in found):
+    extents = connect([each.runs for each in found], progress=progress)
+    if extents.cells.sum() == sum(each.cells for each in found):
         raise InputError("every cell is a void; there is nothing to fill from")
     return extents

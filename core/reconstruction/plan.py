@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from demsmith.core.auxiliary import learn_surface, open_auxiliary
+from demsmith.core.auxiliary import check_auxiliary, learn_surface, open_auxiliary
 from demsmith.core.errors import InputError
 from demsmith.core.faults import WATER_REACH, FaultModel, learn_faults
 from demsmith.core.mcmd import Lattice
@@ -69,24 +69,39 @@ class Plan:
         return max(margin, WATER_REACH + 1) if self.options.flat_water else margin
 
 
-def check_auxiliaries(auxiliaries, options):
+def check_auxiliaries(auxiliaries, options, grid, *, inputs=(), progress=SILENT):
     """Refuse auxiliaries that cannot be used, before any work is done for them.
 
     Parameters
     ----------
     auxiliaries : sequence of path
     options : ReconstructOptions
+    grid : Grid
+        The target's.
+    inputs : iterable of path
+        Its files.
+    progress : Progress
+
+    Returns
+    -------
+    list of str
+        The files of all auxiliaries.
 
     Raises
     ------
     InputError
-        If the method is MCMD, or there are more than a source map can tell apart.
+        If the method is MCMD, there are more than a source map can tell apart, or one is refused
+        by `demsmith.core.auxiliary.check_auxiliary`.
+    Cancelled
+        If ``progress`` asks to stop.
     """
     if not auxiliaries:
-        return
+        return []
     if options.method == "mcmd":
         raise InputError("an auxiliary needs the method auto, which can tell what is better")
     auxiliary_code(len(auxiliaries))
+    files = [check_auxiliary(path, grid, inputs=inputs, progress=progress) for path in auxiliaries]
+    return [name for names in files for name in names]
 
 
 def make_plan(ground, counts, options, *, auxiliaries=(), threads=None, progress=SILENT):

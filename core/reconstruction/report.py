@@ -32,7 +32,8 @@ def write_reports(paths, result, options, own, made, boxes):
         facts=_facts(result, own), voids=rows,
         cells_by_source=dict(enumerate(np.bincount(made.sources.ravel()).tolist())),
         scene=scene, options=asdict(options), warnings=result.warnings,
-        faults=fault_rows(result.cells_faulty), auxiliaries=auxiliary_rows(result.auxiliaries),
+        faults=fault_rows(made.removed.counts()), removed=made.removed.rows(own.grid),
+        auxiliaries=auxiliary_rows(result.auxiliaries),
         close_ups=[
             (rows[void], scene.window_around(boxes[void, :2], boxes[void, 2:]))
             for void in striking_voids(rows)
@@ -44,9 +45,29 @@ def write_reports(paths, result, options, own, made, boxes):
             write(path)
 
 
-def fault_rows(cells):
-    """Give what a report lists of known cells that were not believed."""
-    return [{"fault": "Known cells that were not believed, and filled", "cells": cells}]
+_FAULTS = {"spike": "Spikes", "well": "Wells", "rim of a void": "Rims of voids"}
+
+
+def fault_rows(counts):
+    """Give what a report lists of known cells that were not believed.
+
+    Parameters
+    ----------
+    counts : mapping of str to int
+        Cells by the reason, see `demsmith.core.reconstruction.removed.RemovedCells`.
+    """
+    return [
+        {"fault": f"{name}: known cells that were not believed, and filled", "cells": counts[why]}
+        for why, name in _FAULTS.items()
+        if counts.get(why)
+    ]
+
+
+_ALIGNMENT = {
+    "shift_east": "_m", "shift_north": "_m", "bias": "_m", "tilt_east": "_m_per_km",
+    "tilt_north": "_m_per_km", "vertical_scale": "", "blur_east": "_m", "blur_north": "_m",
+    "spread_before": "_m", "spread_after": "_m", "correlation": "", "roughness": "",
+}  # fmt: skip
 
 
 def auxiliary_rows(alignments):
@@ -57,9 +78,7 @@ def auxiliary_rows(alignments):
             "path": each["path"],
             "accepted": each["accepted"],
             "reason": each["reason"],
-            "shift_east_m": each["shift_east"],
-            "shift_north_m": each["shift_north"],
-            "bias_m": each["bias"],
+            **{f"{name}{unit}": each[name] for name, unit in _ALIGNMENT.items()},
         }
         for number, each in enumerate(alignments, start=1)
     ]

@@ -8,6 +8,8 @@ from demsmith.core.voids.sizes import SIZE_CLASSES, size_class
 from demsmith.core.voids.sources import SOURCE_NAMES, WATER, auxiliary_code
 from demsmith.core.voids.table import VoidTable
 
+_HELD = "Nearly all of its rim is level water."
+
 
 def tabulate(plan, extents, voids, patches, grid, *, corner=(0, 0)):
     """Make the table of some voids.
@@ -59,10 +61,11 @@ def _reasons(plan, cells, codes, filled, column):
     interpolated = filled & (codes != WATER) & (codes < auxiliary_code(1))
     reasons = np.where(interpolated, by_size[size_class(cells)], "").astype(object)
     verdicts = np.array(VERDICTS)
-    for k in range(len(plan.surfaces)):
+    for k in reversed(range(len(plan.surfaces))):  # each before what is told already
         verdict = column.of("verdicts", NOT_ASKED, k)
         told = np.char.add(f"auxiliary {k + 1}: ", verdicts[verdict])
         reasons = np.where(verdict == NOT_ASKED, reasons, told.astype(object) + " " + reasons)
+    reasons = np.where(filled & (codes == WATER), _HELD, reasons)
     return np.char.strip(reasons.astype(str))
 
 

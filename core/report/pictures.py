@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from demsmith.core.images import encode_jpeg
+from demsmith.core.relief import gradient, light
 
 LARGEST = 900
 """Pixels of the longer side of a picture of a whole raster."""
@@ -149,8 +150,7 @@ def shading_of(ground):
     if not known.size:
         return Shading(0.0, 1.0, 1.0)
     low, high = (float(level) for level in np.percentile(known, (0.5, 99.5)))
-    slope = np.hypot(*_gradient(ground)) if min(ground.elevation.shape) > 1 else np.zeros(1)
-    steep = float(np.percentile(slope, 85))
+    steep = float(np.nanpercentile(np.hypot(*_gradient(ground)), 85))
     exaggeration = min(max(0.55 / steep, 0.5), 10.0) if steep > 0 else 1.0
     return Shading(low, max(high, low + 1.0), exaggeration)
 
@@ -186,32 +186,18 @@ def relief(ground, shading, *, tinted=True):
 
 
 def _light(ground, exaggeration):
-    """Light that falls on each pixel, 0 to 1."""
-    if min(ground.elevation.shape) < 2:
-        return np.full(ground.elevation.shape, math.sin(math.radians(_ALTITUDE)), np.float32)
-    south, east = (exaggeration * slope for slope in _gradient(ground))
-    up = 1 / np.sqrt(1 + south**2 + east**2)
-    high, flat = math.sin(math.radians(_ALTITUDE)), math.cos(math.radians(_ALTITUDE))
-    total = np.zeros_like(up)
-    for azimuth, weight in _LIGHTS:
-        angle = math.radians(azimuth)
-        toward = south * math.cos(angle) - east * math.sin(angle)
-        total += weight * np.clip(up * (high + flat * toward), 0, 1)
-    return total
+    """Light that falls on each pixel, 0 to 1; on level ground where there is no elevation."""
+    east, north = (exaggeration * np.nan_to_num(slope) for slope in _gradient(ground))
+    return sum(
+        weight * light(east, north, azimuth=azimuth, altitude=_ALTITUDE)
+        for azimuth, weight in _LIGHTS
+    )
 
 
 def _gradient(ground):
-    """Slopes toward the south and the east; level where there is no elevation."""
-    known = np.isfinite(ground.elevation)
-    mean = ground.elevation[known].mean() if known.any() else 0
-    slopes = np.gradient(np.where(known, ground.elevation, mean), ground.side)
-    return [np.where(_all_around(known), slope, 0) for slope in slopes]
-
-
-def _all_around(known):
-    """Mark the cells that are known and whose four neighbours are."""
-    padded = np.pad(known, 1, constant_values=True)
-    return known & padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
+    """Slopes toward the east and the north; NaN where there is no elevation."""
+    side = np.full(len(ground.elevation), ground.side)
+    return gradient(ground.elevation, ~np.isfinite(ground.elevation), side, side)
 
 
 def coloured(level, stops):

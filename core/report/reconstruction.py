@@ -26,17 +26,15 @@ from demsmith.core.voids.sizes import SIZE_CLASSES
 from demsmith.core.voids.sources import LEFT, ORIGINAL, SOURCES
 
 _MOST_ROWS = 25
+_MOST_REMOVED = 50
 _MOST_DOTS = 1500
 _COLOR_OF = {source.name: hexadecimal(source.color) for source in SOURCES}
-_AUXILIARY_TITLES = {
-    "name": "Auxiliary", "path": "File", "accepted": "Used", "reason": "Why",
-    "shift_east_m": "Shift east [m]", "shift_north_m": "Shift north [m]", "bias_m": "Bias [m]",
-}  # fmt: skip
+_AUXILIARY_TITLES = {"name": "Auxiliary", "path": "File", "accepted": "Used", "reason": "Why"}
 
 
 def reconstruction_report(
     *, facts, voids, cells_by_source, scene, close_ups=(), options=None, warnings=(), faults=(),
-    auxiliaries=(), validation=None, title="Reconstruction", progress=SILENT,
+    removed=(), auxiliaries=(), validation=None, title="Reconstruction", progress=SILENT,
 ):  # fmt: skip
     """Make the report of a reconstruction.
 
@@ -57,8 +55,11 @@ def reconstruction_report(
     options : mapping, optional
     warnings : sequence of str
     faults, auxiliaries : sequence of mappings
-        A row for each fault that was found, and for each auxiliary raster; their keys become
-        columns.
+        A row for each kind of fault that was found, with its number of ``cells``, and for each
+        auxiliary raster; their keys become columns.
+    removed : sequence of mappings
+        A row for each known cell that was not believed, the most changed first: ``row``,
+        ``column``, ``x``, ``y``, the elevations ``before`` and ``after``, and the ``reason``.
     validation : Comparison, optional
     title : str
     progress : Progress
@@ -81,7 +82,7 @@ def reconstruction_report(
         _expected(voids, scene.unit),
         _validation(validation),
         _listed("Auxiliary rasters", auxiliaries, _AUXILIARY_TITLES),
-        _listed("Faults", faults, None),
+        _faults(faults, removed, scene.unit),
         _largest(voids, scene.unit),
         Section("What was done", [Facts(dict(facts)), *([Facts(options)] if options else [])]),
     ]
@@ -98,6 +99,7 @@ def reconstruction_report(
         "expected_error": expected_error(voids),
         "expected_error_by_size": _by_size(voids),
         "faults": list(faults),
+        "removed_cells": list(removed),
         "auxiliaries": list(auxiliaries),
         "validation": asdict(validation) if validation else None,
         "void_table": voids,
@@ -268,6 +270,29 @@ def _validation(validation):
 
 def _listed(title, rows, titles):
     return Section(title, [table_of(rows, titles)]) if rows else None
+
+
+def _faults(faults, removed, unit):
+    if not faults:
+        return None
+    blocks = [table_of(faults)]
+    if removed:
+        total = sum(row["cells"] for row in faults)
+        blocks.append(_removed(removed, total, unit))
+    return Section("Faults", blocks)
+
+
+def _removed(removed, total, unit):
+    shown = removed[:_MOST_REMOVED]
+    columns = [
+        Column("tile", "Tile"), Column("row", "Row"), Column("column", "Column"),
+        Column("x", "x", 5), Column("y", "y", 5), Column("before", f"Was [{unit}]"),
+        Column("after", f"Is [{unit}]"), Column("reason", "Why"),
+    ]  # fmt: skip
+    columns = [column for column in columns if column.name in shown[0]]
+    listed = "all" if len(removed) == total else f"the {written(len(removed))} most changed"
+    caption = f"The {len(shown)} most changed of {written(total)} cells; the JSON report has "
+    return Table(columns, shown, caption + listed)
 
 
 def _largest(voids, unit):

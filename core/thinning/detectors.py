@@ -10,7 +10,7 @@ import numpy as np
 
 from demsmith.core import parallel
 from demsmith.core.progress import SILENT, Span
-from demsmith.core.thinning.strips import strips
+from demsmith.core.strips import strips
 
 # Of `ridges`; docs/thinning.md tells how they were measured.
 _SMOOTHING = 0.3

@@ -3,7 +3,7 @@
 import numpy as np
 
 from demsmith.core.progress import SILENT, Span, checkpoint
-from demsmith.core.thinning.strips import strips
+from demsmith.core.strips import strips
 
 _DIGITS = 1 << 16
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from demsmith.core.elevations import checked
 from demsmith.core.errors import InputError
-from demsmith.core.mcmd.lattice import metres
 from demsmith.core.options import options_from
+from demsmith.core.pixel_size import metres
 from demsmith.core.progress import SILENT, Span, checkpoint
 from demsmith.core.thinning.detectors import random_scores, ridge_scores, sobel_scores
 from demsmith.core.thinning.options import ThinOptions

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from demsmith.core.mcmd.lattice import metres
 from demsmith.core.mcmd.maps import Maps
 from demsmith.core.options import validate
+from demsmith.core.pixel_size import metres
 from demsmith.core.progress import SILENT, Span
 from demsmith.core.tuning.holdouts import punched_holdouts, sampled_holdouts
 from demsmith.core.tuning.parameters import axes_of

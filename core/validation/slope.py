@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from demsmith.core.mcmd.lattice import metres
+from demsmith.core.pixel_size import metres
 from demsmith.core.progress import SILENT
 from demsmith.core.thinning.detectors import sobel_scores
 

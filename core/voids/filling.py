@@ -7,8 +7,8 @@ import numpy as np
 from demsmith.core.elevations import checked
 from demsmith.core.errors import InputError
 from demsmith.core.mcmd import Lattice, Maps, displacement_of, interpolate, relax_voids
-from demsmith.core.mcmd.lattice import metres
 from demsmith.core.options import options_from
+from demsmith.core.pixel_size import metres
 from demsmith.core.progress import SILENT, Span
 from demsmith.core.voids.accurate import (
     SOURCE_OF_METHOD,

@@ -5,7 +5,7 @@ import os
 
 import numpy as np
 import pytest
-from support import digest, hills, make_raster
+from support import WGS84_3ARC, digest, hills, make_raster
 
 from demsmith.core import raster
 from demsmith.core.options import specifications
@@ -75,6 +75,28 @@ def test_what_is_on_by_default_can_be_turned_off(demsmith, tmp_path, output):
         assert demsmith("reconstruct", dem, output, "--overwrite", *words).status == 0
         kept.append(raster.read(output).values[30, 30] == ground[30, 30])
     assert kept == [False, True]
+
+
+def test_summary_tells_where_cells_are_from_and_which_were_removed(demsmith, tmp_path, output):
+    west, east = tmp_path / "west", tmp_path / "east"
+    ground = hills(200, 260).astype(np.float32)
+    ground[:, :100] = 7
+    ground[60, 150] += 900
+    ground[30:34, 40:44] = ground[100:105, 199] = -9999
+    x, step, _, y, *_ = WGS84_3ARC
+    there = x + 190 * step, step, 0, y, 0, -step
+    for folder, values, place in (
+        (west, ground[:, :200], WGS84_3ARC), (east, hills(200, 260)[:, 190:], there),
+    ):  # fmt: skip
+        folder.mkdir()
+        make_raster(folder / "dem.tif", values, geotransform=place, nodata=-9999)
+    words = "--method", "mcmd", "--neighbours", east
+    _, _, err = demsmith("reconstruct", west / "dem.tif", output, *words)
+    told = "filled 22 cells in 2 voids (neighbouring tile: 5, water held flat: 16), 1 of them "
+    assert err.splitlines()[-1].startswith(told + "known before and not believed in ")
+    _, _, err = demsmith("mosaic", west, tmp_path / "out", "--method", "mcmd", "--workers", 0)
+    told = "filled 22 cells in 3 voids of 1 tiles (water held flat: 16), 1 of them known before"
+    assert told in err
 
 
 def test_auxiliary_fills_what_no_interpolation_could_know(demsmith, tmp_path, output):

@@ -11,7 +11,7 @@ from scenes import disc, fractal, holed, plane
 from scipy.ndimage import distance_transform_edt
 
 from demsmith.core.mcmd import Lattice
-from demsmith.core.mcmd.lattice import metres
+from demsmith.core.pixel_size import metres
 from demsmith.core.voids import find_voids, survey_rims
 from demsmith.core.voids.accurate import ESTIMATORS, SOURCE_OF_METHOD, Model, estimate, margin
 from demsmith.core.voids.accurate.spectrum import HIGHEST, Covariance

@@ -7,7 +7,7 @@ import pytest
 from scenes import disc, fractal, holed, plane
 
 from demsmith.core.errors import Cancelled
-from demsmith.core.mcmd.lattice import metres
+from demsmith.core.pixel_size import metres
 from demsmith.core.validation import punch_voids
 from demsmith.core.voids import fill_voids
 from demsmith.core.voids.accurate import ESTIMATORS, learn, training_windows

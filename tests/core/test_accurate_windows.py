@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import holed
 
-from demsmith.core.mcmd.lattice import metres
+from demsmith.core.pixel_size import metres
 from demsmith.core.voids.accurate import BLOCK, training_spans, training_windows
 
 MOST = 12

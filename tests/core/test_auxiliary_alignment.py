@@ -81,6 +81,17 @@ def test_bias_tilt_and_scale_are_found_and_undone():
     assert error(feet, resampler, target) < 1.3
 
 
+@pytest.mark.parametrize("moved", [(2, -3), (-9, 6)])
+@pytest.mark.parametrize("factor", [1 / 0.3048, 0.3048])
+def test_a_shift_is_found_whatever_the_unit(moved, factor):
+    wide = ground()
+    found, resampler = aligned(cut(wide), factor * noisy(cut(wide, *moved)))
+    assert found.accepted
+    assert found.shift_north == pytest.approx(30 * moved[0], abs=3)
+    assert found.shift_east == pytest.approx(-30 * moved[1], abs=3)
+    assert error(found, resampler, cut(wide)) < 1.3
+
+
 def test_a_sharper_auxiliary_is_smoothed_and_a_smoother_one_sharpened():
     from scipy.ndimage import gaussian_filter
 
@@ -91,6 +102,8 @@ def test_a_sharper_auxiliary_is_smoothed_and_a_smoother_one_sharpened():
     assert found.blur_east == pytest.approx(30 * 1.2, rel=0.15)
     assert found.spread_after < 0.2 * found.spread_before
     assert error(found, resampler, cut(soft)) < 1
+    feet, _ = aligned(cut(soft), noisy(cut(sharp), 0.2) / 0.3048)
+    assert feet.blur_north == pytest.approx(30 * 0.8, rel=0.15)
     back, resampler = aligned(cut(sharp), noisy(cut(soft), 0.2))
     assert back.blur_east < -20
     assert back.spread_after < 0.7 * back.spread_before

@@ -22,6 +22,7 @@ from demsmith.core.auxiliary import (
 )
 from demsmith.core.raster import Grid, open_tiles, read
 from demsmith.core.raster.peer import gdal_fill
+from demsmith.core.validation import single_holes
 from demsmith.core.voids import accurate, fill_voids, find_voids
 from demsmith.core.voids.accurate import training_windows
 
@@ -163,16 +164,25 @@ def test_the_engine_fills_the_delta_of_a_learned_surface():
     assert (sigma[VOID] > 0).all()
 
 
+def real_void(name):
+    return read(shared_data(name)).void[:1200, :1200][-700:, -700:]
+
+
 @pytest.mark.parametrize(
-    "mask", ["pyrenees_raw/N42E001.hgt", "rainier_raw/mt_rainier_90m_N46W122.tif"]
+    "void",
+    [
+        lambda: real_void("pyrenees_raw/N42E001.hgt"),
+        lambda: real_void("rainier_raw/mt_rainier_90m_N46W122.tif"),
+        lambda: single_holes(np.ones((700, 700), bool), cells=(1500, 3500, 6500), count=4, seed=0),
+    ],
 )
-def test_on_a_real_pair_it_beats_idw_of_the_delta_by_far(mask):
+def test_on_a_real_pair_it_beats_idw_of_the_delta_by_far(void):
     target = read(shared_data("pair_sangabriel/nasadem_1s.tif"))
     path = shared_data("pair_sangabriel/copernicus_glo30_1s.tif")
     part = np.s_[0:700, 0:700]
     truth = target.values[part].astype(np.float64)
     grid = target.grid.part(*part)
-    void = np.ascontiguousarray(read(shared_data(mask)).void[:1200, :1200][-700:, -700:])
+    void = np.ascontiguousarray(void())
     auxiliary = read(path).values[part]
     by_idw = auxiliary + gdal_fill(truth - auxiliary, void)[0]
     pixel_size = grid.pixel_size_m()

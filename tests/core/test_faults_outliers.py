@@ -83,6 +83,35 @@ def test_known_cell_alone_in_a_large_void_is_not_judged():
     assert not find_outliers(values, void, pixel_size=CELL).any()
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_end_of_a_valley_or_ridge_between_voids_stays_and_a_spike_in_it_does_not(sign):
+    """As at row 1083, column 823 of the Pyrenees: the rays with ground all leave the valley."""
+    rng = np.random.default_rng(0)
+    ground = 850 + rng.normal(0, 12, (80, 80))
+    floor = np.array(
+        [(38, 42), (39, 40), (39, 41), (39, 42), (40, 40), (40, 41), (40, 42), (41, 41)]
+    )
+    ground[tuple(floor.T)] = [678, 718, 696, 668, 705, 678, 667, 664]
+    void = np.zeros(ground.shape, bool)
+    void[30:39, 30:42] = void[39:41, 30:40] = void[41, 30:39] = True
+    ground *= sign
+    assert not find_outliers(ground, void, pixel_size=CELL).any()
+    ground[40, 41] -= sign * 250
+    assert cells(find_outliers(ground, void, pixel_size=CELL)) == [(40, 41)]
+
+
+def test_a_real_valley_between_voids_stays():
+    raster = pytest.importorskip("demsmith.core.raster")
+    pytest.importorskip("osgeo.gdal", reason="GDAL is missing")
+    tile = raster.read(shared_data("pyrenees_raw/N42E001.hgt"))
+    part = slice(1000, 1150), slice(750, 900)
+    size = tuple(each[part[0]] for each in tile.grid.pixel_size_m())
+    found = find_outliers(
+        tile.values[part], tile.void[part], model=learn_faults([tile]), pixel_size=size
+    )
+    assert not found[83, 73]
+
+
 def ridge(row, column):
     return 800.0 - 60.0 * abs(column - 50)
 

@@ -74,7 +74,7 @@ def test_constant_ground_is_thinned_all_over(detector):
 
 @every_detector
 def test_result_does_not_depend_on_threads_or_strips(detector, monkeypatch):
-    from demsmith.core.thinning import strips
+    from demsmith.core import strips
 
     ground = np.rint(fractal((97, 60)))  # whole metres: many ties
     void = disc(ground.shape, (40, 20), 9)

@@ -50,8 +50,9 @@ def test_loads_and_unloads_in_the_window(registry):
         provider = registry.providerById("demsmith")
         names = {tool.name() for tool in provider.algorithms()}
         assert names == {
-            "fillvoids", "reconstructfromsamples", "reconstructmosaic", "reconstructsrtm",
-            "thinraster", "validatefill",
+            "drainagearea", "fillvoids", "reconstructfromsamples", "reconstructmosaic",
+            "reconstructsrtm", "relief", "solarirradiance", "srtmtodrainageandsun", "thinraster",
+            "validatefill",
         }  # fmt: skip
         assert provider.name() == "Demsmith"
         assert provider.longName() != provider.name()

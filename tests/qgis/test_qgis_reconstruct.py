@@ -1,4 +1,4 @@
-"""The tool *Reconstruct SRTM voids*: runs, worker thread, `qgis_process`, cancel."""
+"""The tool *Reconstruct SRTM voids*: runs, and `qgis_process`."""
 
 import json
 import os
@@ -16,7 +16,6 @@ from qgis.core import (
     QgsRasterRange,
     QgsVectorLayer,
 )
-from qgis_runs import TaskRun
 from support import WGS84_3ARC, digest, hills, make_raster, shared_data
 
 from demsmith.core.voids import FILLED, LEFT, ORIGINAL
@@ -69,15 +68,6 @@ def pair(tmp_path):
     values = truth.copy()
     values[HOLE] = VOID
     return make_raster(tmp_path / "tile.tif", values, nodata=VOID), truth
-
-
-@pytest.fixture(scope="module")
-def large(tmp_path_factory):
-    """Make a raster of 4 million cells with voids of several sizes."""
-    values = np.tile(hills(400, 400), (5, 5))
-    for side in range(2, 32):
-        values[side * 50 : side * 51, side * 50 : side * 51] = VOID
-    return make_raster(tmp_path_factory.mktemp("large") / "large.tif", values, nodata=VOID)
 
 
 # --- runs ----------------------------------------------------------------------------------------
@@ -321,7 +311,8 @@ def test_layers_are_styled_when_loaded(plugin, holed):
         ({"AUXILIARIES": ["{folder}/none.tif"]}, "none.tif' does not exist"),
         ({"AUXILIARIES": ["{folder}/text.txt"]}, "is not a raster in a format"),
         ({"AUXILIARIES": ["{source}"], "METHOD": "mcmd"}, "auxiliary needs the method auto"),
-        ({"AUXILIARIES": ["{source}"], "OUTPUT": "{source}"}, "is an input"),
+        ({"AUXILIARIES": ["{source}"]}, "is the input itself"),
+        ({"OUTPUT": "{source}"}, "is an input"),
         ({"NEIGHBOURS": "{folder}/none"}, "is no folder to look for neighbours in"),
         ({"UNCERTAINTY": "{folder}/s.tif", "METHOD": "mcmd"}, "uncertainty needs the method auto"),
         ({"VOIDS_LAYER": "{folder}/voids.csv"}, "must end in one of .gpkg, .geojson"),
@@ -359,42 +350,6 @@ def test_layers_that_are_no_files_are_refused(reconstruct, holed):
     layer = QgsRasterLayer("type=xyz&url=file:///none/{z}/{x}/{y}.png&zmax=1", "tiles", "wms")
     with pytest.raises(QgsProcessingException, match="AUXILIARIES: layer 'tiles' comes from 'wms'"):
         reconstruct(holed[0], AUXILIARIES=[layer])
-
-
-# --- worker thread -------------------------------------------------------------------------------
-
-
-def test_the_window_stays_responsive(plugin, large, tmp_path):
-    run = TaskRun(
-        "reconstructsrtm",
-        {"INPUT": large, "OUTPUT": str(tmp_path / "o.tif"), "REPORT": str(tmp_path / "r.html")},
-    )
-    assert run.fine
-    assert run.outputs["CELLS_FILLED"] == sum(side**2 for side in range(2, 32))
-    assert max(run.gaps) < 0.5
-    assert len(run.progress) >= 5
-    assert run.progress == sorted(run.progress)
-    assert run.progress[-1] == 100
-
-
-@pytest.mark.parametrize("percent", [1, 20, 50, 90])
-def test_cancel_is_prompt_and_leaves_nothing(plugin, large, tmp_path, percent):
-    folder = tmp_path / "out"
-    folder.mkdir()
-    old = folder / "filled.tif"
-    old.write_bytes(b"the user's older result")
-    names = {"SOURCE_MAP": "s.tif", "UNCERTAINTY": "u.tif", "VOIDS_LAYER": "v.gpkg",
-             "REPORT": "r.html"}  # fmt: skip
-    paths = {name: str(folder / file) for name, file in names.items()}
-    run = TaskRun(
-        "reconstructsrtm", {"INPUT": large, "OUTPUT": str(old), **paths}, cancel_at=percent
-    )
-    assert run.cancelled_at is not None
-    assert run.ended_at - run.cancelled_at < 1
-    assert not run.fine
-    assert os.listdir(folder) == ["filled.tif"]
-    assert old.read_bytes() == b"the user's older result"
-    assert "cancelled; nothing was written" in run.feedback.textLog()
 
 
 # --- qgis_process --------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from demsmith.core.mcmd import relax_voids
-from demsmith.core.mcmd.lattice import metres
+from demsmith.core.pixel_size import metres
 from demsmith.core.progress import SILENT, Span
 from demsmith.core.voids import sources
 from demsmith.core.voids.accurate.blending import blend, shares_of, sigma_of, tensions_of
