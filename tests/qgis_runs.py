@@ -30,6 +30,15 @@ def parameter_row(parameter):
     return row + ["advanced"] * bool(parameter.flags() & flags.FlagAdvanced)
 
 
+def assert_parameters(made, promised):
+    """Require of a tool these rows of `parameter_row`, one a line, and that each is explained."""
+    rows = [parameter_row(parameter) for parameter in made.parameterDefinitions()]
+    assert rows == [line.split() for line in promised.strip().splitlines()]
+    for parameter in made.parameterDefinitions():
+        assert parameter.help(), parameter.name()
+        assert parameter.description() != parameter.name()
+
+
 class TaskRun:
     """One run of a tool as a task, with the main thread's event loop ticking meanwhile."""
 

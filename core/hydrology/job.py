@@ -10,7 +10,7 @@ from demsmith.core import raster
 from demsmith.core.errors import InputError
 from demsmith.core.hydrology.drainage import drainage_area
 from demsmith.core.hydrology.options import DrainageOptions
-from demsmith.core.hydrology.outputs import Outputs, southward, write_outputs
+from demsmith.core.hydrology.outputs import Outputs, write_outputs
 from demsmith.core.options import validate
 from demsmith.core.progress import SILENT, Span
 from demsmith.core.raster.grid import check_same_grid
@@ -170,19 +170,21 @@ def _check_sense(wanted, options, weights, filled_mask):
 
 
 def _read_filled(path, source, progress):
-    """Tell which cells were filled, in the order of `southward`."""
+    """Tell which cells were filled, in the order of `raster.north_up`."""
     codes = raster.read(path, progress=progress)
     _check_place(codes, source, f"the mask of filled cells, '{path}',")
-    return ((codes.values != 0) & ~codes.void)[southward(source.grid)]
+    order, _ = raster.north_up(source.grid)
+    return ((codes.values != 0) & ~codes.void)[order]
 
 
 def _read_weights(path, source, progress):
-    """Give the weights, NaN where there is none, in the order of `southward`."""
+    """Give the weights, NaN where there is none, in the order of `raster.north_up`."""
     weights = raster.read(path, progress=progress)
     _check_place(weights, source, f"the raster of weights, '{path}',")
     values = raster.elevations(weights, np.float64)
     values[weights.void] = np.nan
-    return values[southward(source.grid)]
+    order, _ = raster.north_up(source.grid)
+    return values[order]
 
 
 def _check_place(other, source, what):
@@ -192,8 +194,8 @@ def _check_place(other, source, what):
 
 
 def _drain(source, weights, options, threads, progress):
-    """Drain the source in the order of `southward`, elevations in the band's unit."""
-    rows, columns = southward(source.grid)
+    """Drain the source in the order of `raster.north_up`, elevations in the band's unit."""
+    (rows, columns), _ = raster.north_up(source.grid)
     pixel_size = source.grid.pixel_size_m()
     unit = raster.height_unit(source.meta, source.grid.crs) or 1.0
     if options.max_depth is not None:
@@ -225,7 +227,8 @@ def _warnings(source, weights, options, network):
             "they are voids, into which water leaves"
         )
     if weights is not None:
-        known = ~source.void[southward(source.grid)]
+        order, _ = raster.north_up(source.grid)
+        known = ~source.void[order]
         lacking = int(np.count_nonzero(np.isnan(weights) & known))
         if lacking:
             warnings.append(f"{lacking} cells have an elevation but no weight; they add nothing")

@@ -76,20 +76,6 @@ class Outputs:
             check_layer_output(streams, crs=crs, **checks)
 
 
-def southward(grid):
-    """Give the index that puts a grid's rows from north to south and its columns eastward.
-
-    The same index takes the result back.
-
-    Examples
-    --------
-    >>> southward(raster.Grid((2, 3), (0, 1, 0, 0, 0, 1.5)))
-    (slice(None, None, -1), slice(None, None, None))
-    """
-    as_is, turned = slice(None), slice(None, None, -1)
-    return turned if grid.south_up else as_is, turned if grid.geotransform[1] < 0 else as_is
-
-
 def write_outputs(paths, drained, source, *, filled, threads, creation_options, progress):
     """Write all that is wanted, or nothing.
 
@@ -98,7 +84,7 @@ def write_outputs(paths, drained, source, *, filled, threads, creation_options, 
     paths : dict
         As `Outputs.paths` gives them.
     drained : Drainage
-        Of the source in the order of `southward`.
+        Of the source in the order of `raster.north_up`.
     source : Raster
     filled : (H, W) bool array or None
         As in `Drainage.flags`, in the same order.
@@ -126,7 +112,7 @@ class _Writer:
 
     def __init__(self, paths, drained, source, filled, threads, creation_options):
         self._paths, self._drained, self._source, self._filled = paths, drained, source, filled
-        self._turn = southward(source.grid)
+        self._turn, _ = raster.north_up(source.grid)
         self._running = dict(threads=threads)
         self._writing = dict(
             threads=threads, creation_options=creation_options, same_quantity=False

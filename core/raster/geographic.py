@@ -100,7 +100,7 @@ def north_up(grid):
     Parameters
     ----------
     grid : Grid
-        With a geotransform.
+        One without a geotransform stays as it is: its first row is taken for the northern one.
 
     Returns
     -------
@@ -117,6 +117,8 @@ def north_up(grid):
     >>> order[0], turned.geotransform
     (slice(None, None, -1), (500.0, 10.0, 0.0, 940.0, 0.0, -10.0))
     """
+    if not grid.georeferenced:
+        return (slice(None), slice(None)), grid
     x, width, _, y, _, height = grid.geotransform
     rows, columns = grid.shape
     order = tuple(slice(None, None, -1 if back else None) for back in (height > 0, width < 0))

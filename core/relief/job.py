@@ -131,9 +131,7 @@ def relief_file(
 
 def _made(source, options, threads, progress):
     """Compute what is asked for; gives it and its unit."""
-    order, grid = np.s_[:, :], source.grid
-    if grid.georeferenced:
-        order, grid = raster.north_up(grid)
+    order, grid = raster.north_up(source.grid)
     ground = dict(
         values=raster.elevations_m(source)[order], void=source.void[order],
         pixel_size=grid.pixel_size_m(), threads=threads, progress=progress,

@@ -5,7 +5,7 @@ from urllib.parse import unquote, urlparse
 
 import pytest
 from qgis.PyQt.QtGui import QImage
-from qgis_runs import parameter_row, tool
+from qgis_runs import assert_parameters, tool
 
 TILE_PARAMETERS = """
 INPUT            raster             -              required
@@ -93,11 +93,7 @@ def made(plugin, request):
 
 
 def test_parameters_are_the_promised_ones(made):
-    promised = [line.split() for line in PARAMETERS[made.name()].strip().splitlines()]
-    assert [parameter_row(parameter) for parameter in made.parameterDefinitions()] == promised
-    for parameter in made.parameterDefinitions():
-        assert parameter.help(), parameter.name()
-        assert parameter.description() != parameter.name()
+    assert_parameters(made, PARAMETERS[made.name()])
     method = made.parameterDefinition("METHOD")
     assert (method.options(), method.usesStaticStrings()) == (["auto", "mcmd"], True)
 

@@ -9,7 +9,7 @@ from gdal_reading import read
 from qgis import processing
 from qgis.core import QgsProcessingException, QgsProject, QgsRasterLayer
 from qgis.PyQt.QtCore import QDate, QTime
-from qgis_runs import TaskRun, parameter_row, tool
+from qgis_runs import TaskRun, assert_parameters, tool
 from support import digest, hills, make_raster
 
 PARAMETERS = """
@@ -95,12 +95,8 @@ def light(path):
 
 
 def test_parameters_are_the_promised_ones(plugin):
-    promised = [line.split() for line in PARAMETERS.strip().splitlines()]
     made = tool("solarirradiance")
-    assert [parameter_row(parameter) for parameter in made.parameterDefinitions()] == promised
-    for parameter in made.parameterDefinitions():
-        assert parameter.help(), parameter.name()
-        assert parameter.description() != parameter.name()
+    assert_parameters(made, PARAMETERS)
     for name in ("WHEN", "ATMOSPHERE", "DIFFUSE_MODEL"):
         assert made.parameterDefinition(name).usesStaticStrings()
 
