@@ -113,19 +113,29 @@ class Tool(QgsProcessingAlgorithm):
             return None
         return file_of(layer, name)
 
-    def add_running(self):
-        """Declare how the tool runs and how rasters are written."""
+    def add_threads(self):
+        """Declare how the tool runs."""
         add(self, number("THREADS", "Threads", kind=int, optional=True, minValue=1), advanced=True,
             help_text="Threads that compute; not given: one for every core. "
             "The result is the same.")  # fmt: skip
+
+    def add_running(self):
+        """Declare how the tool runs and how rasters are written."""
+        self.add_threads()
         add(self, creation_options(), advanced=True,
             help_text="Left empty: tiled and compressed.")  # fmt: skip
 
-    def read_running(self, parameters, context):
+    def read_threads(self, parameters, context):
         """Give the arguments of the core's file functions that say how the tool runs."""
         return dict(
             threads=read_number(self, "THREADS", parameters, context, kind=int),
             overwrite=True,  # QGIS has asked the user
+        )
+
+    def read_running(self, parameters, context):
+        """Give the same with how rasters are written."""
+        return dict(
+            **self.read_threads(parameters, context),
             creation_options=read_creation_options(
                 self.parameterAsString(parameters, "CREATION_OPTIONS", context)
             ),

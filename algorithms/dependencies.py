@@ -15,8 +15,9 @@ from qgis.PyQt.QtCore import QCoreApplication
 OLDEST_PYTHON = (3, 11)
 OLDEST_NUMPY = "1.26"
 REQUIREMENTS = ("numpy>=" + OLDEST_NUMPY, "numba>=0.59", "geographiclib>=2.0", "scipy>=1.11")
-# What some tools need: tuning, images, sunlight, validation. Without them the others still work.
-EXTRAS = ("nlopt>=2.7", "openimageio>=3.0", "pvlib>=0.11", "scikit-image>=0.22")
+# What some tools need: compression, tuning, images, sunlight, validation. Without them the others
+# still work.
+EXTRAS = ("msgpack>=1.0", "nlopt>=2.7", "openimageio>=3.0", "pvlib>=0.11", "scikit-image>=0.22")
 
 
 def _tr(text):

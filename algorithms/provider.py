@@ -57,8 +57,12 @@ class DemsmithProvider(QgsProcessingProvider):
             QgsMessageLog.logMessage(dependencies.problem(), "Demsmith", Qgis.MessageLevel.Warning)
             return
         from demsmith.algorithms.chain import chains
+        from demsmith.algorithms.compress import Compress
+        from demsmith.algorithms.decompress import Decompress
         from demsmith.algorithms.drainagearea import DrainageArea
         from demsmith.algorithms.fillvoids import FillVoids
+        from demsmith.algorithms.inverseprocedural import InverseProcedural
+        from demsmith.algorithms.learndictionary import LearnDictionary
         from demsmith.algorithms.reconstructfromsamples import ReconstructFromSamples
         from demsmith.algorithms.reconstructmosaic import ReconstructMosaic
         from demsmith.algorithms.reconstructsrtm import ReconstructSrtm
@@ -67,8 +71,12 @@ class DemsmithProvider(QgsProcessingProvider):
         from demsmith.algorithms.thinraster import ThinRaster
         from demsmith.algorithms.validatefill import ValidateFill
 
+        self.addAlgorithm(Compress())
+        self.addAlgorithm(Decompress())
         self.addAlgorithm(DrainageArea())
         self.addAlgorithm(FillVoids())
+        self.addAlgorithm(InverseProcedural())
+        self.addAlgorithm(LearnDictionary())
         self.addAlgorithm(ReconstructFromSamples())
         self.addAlgorithm(ReconstructMosaic())
         self.addAlgorithm(ReconstructSrtm())

@@ -107,20 +107,10 @@ def _flag(help_text):
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class FileRun:
     """How a verb runs, what it may replace, and how it tells what it did."""
 
     overwrite: Annotated[bool, _flag("Replace outputs that exist already.")] = False
-    creation_option: Annotated[
-        tuple[str, ...],
-        Parameter(
-            group=RUN,
-            metavar="KEY=VALUE",
-            negative=(),
-            show_default=False,
-            help="GDAL creation option of the GeoTIFF, such as COMPRESS=LZW; repeat for more.",
-        ),
-    ] = ()
     threads: Annotated[
         int | None,
         Parameter(
@@ -154,3 +144,20 @@ class Run:
             print(json.dumps(result.as_dict(), allow_nan=False))
         elif not self.quiet:
             print(summary, file=sys.stderr)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Run(FileRun):
+    """The same of one that writes GeoTIFFs."""
+
+    creation_option: Annotated[
+        tuple[str, ...],
+        Parameter(
+            group=RUN,
+            metavar="KEY=VALUE",
+            negative=(),
+            show_default=False,
+            help="GDAL creation option of the GeoTIFF, such as COMPRESS=LZW; repeat for more.",
+        ),
+    ] = ()

@@ -19,6 +19,11 @@ _VERBS = {
     "thin": "Keep only the cells that carry the shape, or a random share.",
     "drainage": "Tell how much ground drains through each cell, and find streams.",
     "relief": "Make slope, aspect, hillshade, mean deviation or topographic position.",
+    "proceduralize": "Model terrain by noise functions, and evaluate it at any resolution.",
+    "learn": "Learn a dictionary of terrain shapes from exemplars.",
+    "compress": "Compress an elevation raster within a guaranteed error.",
+    "decompress": "Decompress an .sct file, or any window of it, at any scale.",
+    "info": "Tell what an .sct file holds, how small it is and how exact.",
     "validate": "Tell how wrong fills are, by artificial voids like the real ones.",
 }
 

@@ -26,6 +26,13 @@ class _Window:
 
     def __init__(self):
         self.messages = []
+        self.drop_handlers = []
+
+    def registerCustomDropHandler(self, handler):
+        self.drop_handlers.append(handler)
+
+    def unregisterCustomDropHandler(self, handler):
+        self.drop_handlers.remove(handler)
 
     def messageBar(self):
         return self
@@ -50,16 +57,19 @@ def test_loads_and_unloads_in_the_window(registry):
         provider = registry.providerById("demsmith")
         names = {tool.name() for tool in provider.algorithms()}
         assert names == {
-            "drainagearea", "fillvoids", "reconstructfromsamples", "reconstructmosaic",
-            "reconstructsrtm", "relief", "solarirradiance", "srtmtodrainageandsun", "thinraster",
+            "compress", "decompress", "drainagearea", "fillvoids", "inverseprocedural",
+            "learndictionary", "reconstructfromsamples", "reconstructmosaic", "reconstructsrtm",
+            "relief", "solarirradiance", "srtmtodrainageandsun", "thinraster",
             "validatefill",
         }  # fmt: skip
         assert provider.name() == "Demsmith"
         assert provider.longName() != provider.name()
         assert provider.versionInfo() == demsmith.__version__
         assert not provider.icon().isNull()
+        assert len(window.drop_handlers) == 1
         loaded.unload()
         assert registry.providerById("demsmith") is None
+        assert window.drop_handlers == []
     assert window.messages == []
 
 

@@ -1,0 +1,158 @@
+"""Which tree makes the smallest file: trials on a sample of the tiles."""
+
+import math
+
+import numpy as np
+
+from demsmith.core.codec.residual import encode_residual, fit_weights
+from demsmith.core.errors import InputError
+from demsmith.core.progress import SILENT, Muted, checkpoint
+
+_SAMPLES = {"low": 3, "normal": 8, "high": 24}
+"""Tiles that are coded to compare trees, and to learn weights, by effort."""
+
+# Steps of a tree below a residual, by steps of the residual. Large ones are next to no tree: the
+# best as long as noise is larger than steps, and there for overviews. Small ones make a surface
+# that few cells depart from by more than the error. Between them lies nothing but coasts.
+_FAINT = {"low": (150.0,), "normal": (600.0, 100.0, 20.0), "high": (600.0, 200.0, 70.0, 20.0)}
+_DENSE = {"low": (1.5,), "normal": (2.2, 1.5, 1.1), "high": (4.0, 2.6, 2.0, 1.6, 1.3, 1.1, 0.9)}
+_SMALLEST_DENSE = 3  # units of error, below which dense trees never paid
+
+_ROUNDS = 14  # halvings of an interval of steps
+
+
+def best_tree(
+    analysis, values, void, tiling, *, error, plain, effort, threads=None, progress=SILENT
+):
+    """Choose the tree below a residual.
+
+    Parameters
+    ----------
+    analysis : pyramid.Analysis
+    values : int32 (H, W)
+    void : bool (H, W)
+    tiling : Tiling
+    error : int
+    plain : int or None
+    effort : str
+        ``low``, ``normal`` or ``high``.
+    threads, progress
+        As everywhere.
+
+    Returns
+    -------
+    PyramidTree
+    weights : float32 array
+        For `encode_residual`.
+    """
+    factors = _FAINT[effort] + (_DENSE[effort] if error >= _SMALLEST_DENSE else ())
+    tiles = sampled_tiles(void, tiling, effort)
+    best = None
+    work = dict(tiles=tiles, threads=threads, progress=Muted(progress))
+    bounds = dict(error=error, plain=plain)
+    for done, factor in enumerate(factors):
+        checkpoint(progress, done / len(factors))
+        tree = analysis.tree(factor * (2 * error + 1))
+        surface = tree.surface()
+        weights = fit_weights(values, void, surface, _rounded(values, error))
+        parts, _ = encode_residual(values, void, surface, tiling, weights, **bounds, **work)
+        coded = tree.sections(**work)
+        size = sum(map(len, parts)) + sum(map(len, coded["tree"]))
+        size += len(coded["root"][0]) * len(tiles) / tiling.count
+        if best is None or size < best[0]:
+            best = size, tree, surface
+    tree, surface = best[1:]
+    return tree, fitted(values, void, surface, tiling, **bounds, **work)
+
+
+def sampled_tiles(void, tiling, effort):
+    """Give some tiles that are not all void, evenly spread."""
+    known = [tile for tile in range(tiling.count) if not void[tiling.slices(tile)].all()]
+    count = min(_SAMPLES[effort], len(known))
+    return [known[(2 * k + 1) * len(known) // (2 * count)] for k in range(count)]
+
+
+def fitted(values, void, surface, tiling, *, error, plain, tiles, threads=None, progress=SILENT):
+    """Learn the prediction's weights from some tiles, coded as they will be.
+
+    Neighbours carry the errors that coding makes, which depend on the weights: hence twice.
+
+    Returns
+    -------
+    float32 array
+    """
+    weights = fit_weights(values, void, surface, _rounded(values, error))
+    if not error:
+        return weights
+    _, decoded = encode_residual(
+        values, void, surface, tiling, weights, error=error, plain=plain, tiles=tiles,
+        threads=threads, progress=progress,
+    )  # fmt: skip
+    elsewhere = np.ones_like(void)
+    for tile in tiles:
+        rows, columns = tiling.slices(tile)
+        elsewhere[rows, columns] = void[rows, columns]
+    return fit_weights(values, elsewhere, surface, decoded)
+
+
+def _rounded(values, error):
+    """Give values with about the errors that coding makes."""
+    step = 2 * error + 1
+    return np.rint(values / np.float32(step)).astype(np.int32) * np.int32(step)
+
+
+def tree_of_rmse(analysis, surface, void, rmse):
+    """Give the coarsest tree whose root mean square error at known cells is within ``rmse``."""
+    wanted = float(rmse)
+
+    def close_enough(step):
+        tree = analysis.tree(step)
+        wrong = (tree.surface() - surface)[~void].astype(np.float64)
+        return math.sqrt(np.mean(wrong**2)) <= wanted, tree
+
+    # An orthonormal transform's error is at most a step by the root of 12, at least far less.
+    return _coarsest(close_enough, wanted / 4, wanted * 1024)
+
+
+def tree_of_bytes(analysis, size, *, threads=None, progress=SILENT):
+    """Give the finest tree that takes at most ``size`` bytes.
+
+    Raises
+    ------
+    InputError
+        If none is so small.
+    """
+    rounds = iter(range(2 * _ROUNDS))
+
+    def too_large(step):
+        checkpoint(progress, min(next(rounds) / _ROUNDS, 1))
+        tree = analysis.tree(step)
+        sections = tree.sections(threads=threads, progress=Muted(progress))
+        taken = sum(len(part) for parts in sections.values() for part in parts)
+        return taken > size, tree
+
+    low, high = 2.0**-6, 2.0**30
+    small, tree = too_large(high)
+    if small:
+        raise InputError(f"no tree is as small as {size} bytes; allow more")
+    for _ in range(_ROUNDS + 4):
+        middle = math.sqrt(low * high)
+        large, made = too_large(middle)
+        if large:
+            low = middle
+        else:
+            high, tree = middle, made
+    return tree
+
+
+def _coarsest(close_enough, low, high):
+    """Give the tree of the largest step that is close enough, by halving an interval."""
+    _, tree = close_enough(low)
+    for _ in range(_ROUNDS):
+        middle = math.sqrt(low * high)
+        close, made = close_enough(middle)
+        if close:
+            low, tree = middle, made
+        else:
+            high = middle
+    return tree
