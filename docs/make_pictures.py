@@ -220,6 +220,38 @@ def solar():
     return figure
 
 
+# --- compression ---------------------------------------------------------------------------------
+
+
+def rate_distortion():
+    """Draw error by bytes against the peers."""
+    from compression_pictures import draw_curves  # benchmarks/compression_pictures.py
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(1, 2, figsize=(10, 4.6), dpi=DPI, layout="constrained")
+    draw_curves(axes)
+    return figure
+
+
+def error_map():
+    """Draw a compressed window's ground and its error without and with the residual layer."""
+    from compression_pictures import ERROR, TILE, WINDOW, error_maps
+
+    grid = raster.read(tiles.DATA / tiles.VOID_FREE[TILE]).grid
+    cell = _cell(grid.pixel_size_m(), WINDOW)
+    ground, base, held, bits = error_maps()
+    figure, axes = _panels(1, 3, width=3.9, aspect=1.05)
+    _show(axes[0], relief(ground.astype(float), cell), "the ground", cell)
+    layers = (base, "error without the residual layer [m]"), (
+        held, f"with it: at most {ERROR} m, {bits:.2f} bits per cell",
+    )  # fmt: skip
+    span = dict(cmap="RdBu_r", vmin=-2 * ERROR, vmax=2 * ERROR)
+    for axis, (error, title) in zip(axes[1:], layers, strict=True):
+        _show(axis, error, title, cell, **span)
+    figure.colorbar(axes[2].images[0], ax=axes[1:], shrink=0.8, pad=0.01)
+    return figure
+
+
 def _cell(sizes, window):
     """Give the ground metres per cell in a window's middle, east-west and north-south."""
     return tuple(float(size[window[0]].mean()) for size in sizes)
@@ -266,6 +298,8 @@ PICTURES = {
     "roughness": roughness,
     "solar": solar,
     "drainage": drainage,
+    "rate-distortion": rate_distortion,
+    "error-map": error_map,
 }
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ class SctDropHandler(QgsCustomDropHandler):
 
     def cancel(self):
         """Stop all that still runs."""
-        for run in self._runs:
+        for run in tuple(self._runs):
             run.feedback.cancel()
 
     def _finish(self, run, problem):

@@ -17,7 +17,13 @@ from tiles import DATA, RAW, VOID_FREE  # noqa: E402
 
 from demsmith.core import raster  # noqa: E402
 from demsmith.core.codec import _details, _residual, coding, pyramid, residual, search  # noqa: E402
-from demsmith.core.codec._coder import FRESH, buffer_for, coding_room  # noqa: E402
+from demsmith.core.codec._coder import (  # noqa: E402
+    FRESH,
+    INPUTS,
+    SIZE_WEIGHT_SETS,
+    buffer_for,
+    coding_room,
+)
 from demsmith.core.codec.priors import kept  # noqa: E402
 from demsmith.core.codec.tiling import Tiling  # noqa: E402
 
@@ -30,7 +36,7 @@ def main():
     """Train both streams and write what they know."""
     learned = {}
     for name, module in (("residual", _residual), ("details", _details)):
-        room = coding_room(module.STATES, module.INPUTS, module.WEIGHT_SETS)
+        room = coding_room(module.STATES, INPUTS, SIZE_WEIGHT_SETS)
         room["states"][:] = FRESH
         learned[name] = room
     for job in _jobs():
@@ -61,7 +67,7 @@ def _jobs():
         for error, factor in CASES:
             tree = analysis.tree(factor * (2 * error + 1))
             below = tree.surface()
-            weights = search.fitted(
+            weights, _ = search.fitted(
                 values, source.void, below, tiling, error=error, plain=plain, tiles=samples
             )
             shared = dict(

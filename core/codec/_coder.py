@@ -47,6 +47,26 @@ BYTES_PER_DECISION = 2
 _WHOLE = 1 << 32
 _LIMIT = 500
 
+INPUTS = 8
+"""States that are mixed for a decision of `code_size`."""
+
+PLACES = 256
+"""States of one input for one decision of `code_size`."""
+
+DECISIONS = 8
+"""Decisions of `code_size` that have states of their own; later ones share the last's."""
+
+LEVELS = 24
+"""Sets of weights for each of them."""
+
+SIZE_STATES = INPUTS * PLACES * DECISIONS
+SIZE_WEIGHT_SETS = DECISIONS * LEVELS
+DECISIONS_PER_SIZE = 24 + 66
+"""Of one call of `code_size` at the worst."""
+
+_STEPS_UP = 24  # before the rest is told by its length
+_RATE = np.float32(0.007)
+
 kernel = numba.njit(nogil=True, cache=True, error_model="numpy")
 _inlined = numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 
@@ -61,12 +81,12 @@ def _squashing():
     """Probability in 65536ths of a logit, by its 256ths, from −12 to 12."""
     logits = [(i - 3072 + 0.5) / 256 for i in range(6144)]
     chances = [65536 / (1 + math.exp(-x)) for x in logits]
-    return np.array([min(max(round(p), 24), 65536 - 24) for p in chances], np.int64)
+    return np.array([min(max(round(p), 24), 65536 - 24) for p in chances], np.uint16)
 
 
 def _slowing():
     """Share, in 65536ths, by which a state met n times moves towards the next bit."""
-    return np.array([round(65536 / (n + 1.6)) for n in range(1024)], np.int64)
+    return np.array([round(65536 / (n + 1.6)) for n in range(1024)], np.uint16)
 
 
 _STRETCH, _SQUASH, _SLOW = _stretching(), _squashing(), _slowing()
@@ -151,7 +171,7 @@ def _learn(m, at, bit):
     state = np.int64(read_i32(m[3], at))
     times = state & 1023
     chance = state >> 10
-    chance += ((((1 << 21) - 1) * bit - chance) * _SLOW[times]) >> 16
+    chance += ((((1 << 21) - 1) * bit - chance) * np.int64(_SLOW[times])) >> 16
     write_i32(m[3], at, np.int32((chance << 10) | (times + (times < _LIMIT))))
 
 
@@ -199,13 +219,43 @@ def code_mixed(m, at, count, row, rate, bit, decoding):
         write_f32(m[6], i, opinion)
         total += read_f32(m[4], row + i) * opinion
     place = min(max(int(total * np.float32(256)) + 3072, 0), 6143)
-    chance = _SQUASH[place]
+    chance = np.int64(_SQUASH[place])
     bit = _code(m, chance, bit, decoding)
     step = (np.float32(65536 * bit) - np.float32(chance)) * (rate * np.float32(1 / 65536))
     for i in range(count):
         write_f32(m[4], row + i, read_f32(m[4], row + i) + step * read_f32(m[6], i))
         _learn(m, read_i64(at, i), bit)
     return bit
+
+
+@_inlined
+def code_size(m, at, level, size, decoding):
+    """Code a size from 0 on, by a decision for each step up; give the size.
+
+    Parameters
+    ----------
+    m : tuple
+        From `memory`; the first `SIZE_STATES` states are for sizes.
+    at : int
+        Address of `INPUTS` int64: what each input sees, below `PLACES`. Changed.
+    level : int
+        What chooses the weights, below `LEVELS`.
+    size : int
+    decoding : bool
+    """
+    for i in range(INPUTS):
+        write_i64(at, i, read_i64(at, i) + i * PLACES)
+    step = np.int64(0)
+    while step < _STEPS_UP:
+        if 0 < step < DECISIONS:
+            for i in range(INPUTS):
+                write_i64(at, i, read_i64(at, i) + INPUTS * PLACES)
+        row = min(step, DECISIONS - 1) * LEVELS + level
+        more = np.int64(1) if size > step else np.int64(0)
+        if not code_mixed(m, at, INPUTS, row, _RATE, more, decoding):
+            return step
+        step += 1
+    return step + code_rest(m, size - step, decoding)
 
 
 @kernel

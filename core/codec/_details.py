@@ -8,21 +8,22 @@ the bands of its own level that came before. Blocks of 8 × 8 zeros take one dec
 import numba
 import numpy as np
 
-from demsmith.core.codec._coder import code_adaptive, code_mixed, code_rest, kernel, memory
+from demsmith.core.codec._coder import (
+    DECISIONS_PER_SIZE,
+    LEVELS,
+    SIZE_STATES,
+    code_adaptive,
+    code_size,
+    kernel,
+    memory,
+)
 from demsmith.core.codec._memory import half_octaves
 
-INPUTS = 8
 PAD = 2  # zeros around a band
-_PLACES = 256
-_DECISIONS = 8
-_SIGNS = INPUTS * _PLACES * _DECISIONS
+_SIGNS = SIZE_STATES
 _BLOCKS = _SIGNS + 128
 STATES = _BLOCKS + 64
-_LEVELS = 24
-WEIGHT_SETS = _DECISIONS * _LEVELS
-_RATE = np.float32(0.007)
-_ESCAPE = 20
-DECISIONS_PER_CELL = _ESCAPE + 66  # at the worst: unary, length and bits of the rest, sign
+DECISIONS_PER_CELL = DECISIONS_PER_SIZE + 2  # sign, block
 _BLOCK = 8
 
 
@@ -80,7 +81,7 @@ def code_band(
             l_near = half_octaves(np.float32(near) * np.float32(0.5), 20)
             l_heir = half_octaves(np.float32(heir) * np.float32(0.5), 16)
             l_beside = half_octaves(np.float32(beside) * np.float32(0.5), 16)
-            l_all = half_octaves(np.float32(2 * near + heir + beside) * np.float32(0.25), _LEVELS)
+            l_all = half_octaves(np.float32(2 * near + heir + beside) * np.float32(0.25), LEVELS)
             at[0] = l_near * 3 + kind
             at[1] = (min(west, 3) * 16 + min(north, 3) * 4 + min(ne, 3)) * 3 + kind
             at[2] = l_near // 2 * 16 + l_heir
@@ -89,24 +90,8 @@ def code_band(
             at[5] = l_near * 8 + depth
             at[6] = l_all * 3 + kind
             at[7] = (min(nw, 2) * 9 + min(nn, 2) * 3 + min(ww, 2)) * 8 + min(l_all // 3, 7)
-            for i in range(INPUTS):
-                at[i] += i * _PLACES
             value = np.int64(band[r, c])
-            size = np.int64(0)
-            while size < _ESCAPE:
-                decision = min(size, _DECISIONS - 1)
-                if size > 0 and size < _DECISIONS:
-                    for i in range(INPUTS):
-                        at[i] += INPUTS * _PLACES
-                more = np.int64(1) if abs(value) > size else np.int64(0)
-                more = code_mixed(
-                    m, places, INPUTS, decision * _LEVELS + l_all, _RATE, more, decoding
-                )
-                if not more:
-                    break
-                size += 1
-            if size == _ESCAPE:
-                size += code_rest(m, abs(value) - size, decoding)
+            size = code_size(m, places, l_all, abs(value), decoding)
             if size:
                 slot = _sign(band[r, c - 1]) * 9 + _sign(band[r - 1, c]) * 3
                 slot = _SIGNS + (slot + _sign(parent[up, left])) * 3 + kind

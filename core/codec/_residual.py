@@ -14,10 +14,14 @@ import math
 import numpy as np
 
 from demsmith.core.codec._coder import (
+    DECISIONS_PER_SIZE,
+    INPUTS,
+    LEVELS,
+    SIZE_STATES,
+    SIZE_WEIGHT_SETS,
     code_adaptive,
-    code_mixed,
     code_plain,
-    code_rest,
+    code_size,
     coding_room,
     finish,
     kernel,
@@ -35,21 +39,12 @@ FEATURES = TAPS + 5  # the taps, the tree's own value, and how the tree goes on 
 _ROOM = -(-FEATURES // 4) * 4
 MARGIN = 3  # cells beyond the tile that taps reach
 
-INPUTS = 8
-_PLACES = 256  # states of one input for one decision
-_DECISIONS = 8
-_SIGNS = INPUTS * _PLACES * _DECISIONS
+_SIGNS = SIZE_STATES
 _LOWS = _SIGNS + 512
 _PLAINS = _LOWS + 1024
 STATES = _PLAINS + 512
+DECISIONS_PER_CELL = DECISIONS_PER_SIZE + 24  # low bits, sign
 NO_PLAIN = 1 << 31  # no value of a raster
-LEVELS = 24  # of the neighbours' error, by half octaves
-WEIGHT_SETS = _DECISIONS * LEVELS
-_RATE = np.float32(0.007)
-_ESCAPE = 24  # unary steps before the rest is told by its length
-DECISIONS_PER_CELL = (
-    _ESCAPE + 90
-)  # at the worst: unary, length and bits of the rest, low bits, sign
 
 
 @kernel
@@ -152,7 +147,7 @@ def code_tile(
                         + 32 * np.int64(z[row - 2, column] == plain)
                     )  # fmt: skip
                 away = abs(guess - np.float32(plain)) * scale
-                if near or away < 2:
+                if near or away < np.float32(0.6):
                     slot = _PLAINS + near * 8 + half_octaves(away, 8)
                     level_with = (
                         np.int64(1) if abs(z[row, column] - plain) <= error else np.int64(0)
@@ -207,31 +202,13 @@ def code_tile(
             at[5] = up * 12 + left
             at[6] = half_octaves(bend * scale * 4, 16) * 16 + min(level // 2 + level % 2, 15)
             at[7] = late * 16 + min(level // 2 + level % 2, 15)
-            for i in range(INPUTS):
-                at[i] += i * _PLACES
-
             # The count of steps: its size without the lowest bits, those bits, its sign.
             distance = np.int64(z[row, column]) - centre
             count_of = (abs(distance) + error) // step
             drop = 0
             while not flat and wrong > np.float32(2 << drop) and drop < 20:
                 drop += 1
-            head = count_of >> drop
-            size = np.int64(0)
-            while size < _ESCAPE:
-                decision = min(size, _DECISIONS - 1)
-                if size > 0 and size < _DECISIONS:
-                    for i in range(INPUTS):
-                        at[i] += INPUTS * _PLACES
-                more = np.int64(1) if head > size else np.int64(0)
-                more = code_mixed(
-                    m, places, INPUTS, decision * LEVELS + level, _RATE, more, decoding
-                )
-                if not more:
-                    break
-                size += 1
-            if size == _ESCAPE:
-                size += code_rest(m, head - size, decoding)
+            size = code_size(m, places, level, count_of >> drop, decoding)
             tail = count_of & ((1 << drop) - 1)
             if drop:
                 slot = _LOWS + (min(drop, 15) * 8 + min(size, 7)) * 4
@@ -293,7 +270,7 @@ def _open_row(surface, steps, misses, row, width):
 
 def workspace(height, width):
     """Allocate what `code_tile` needs besides the tile and its data, as it begins."""
-    return primed("residual", coding_room(STATES, INPUTS, WEIGHT_SETS)) | dict(
+    return primed("residual", coding_room(STATES, INPUTS, SIZE_WEIGHT_SETS)) | dict(
         at=np.zeros(INPUTS, np.int64),
         surface=np.zeros((height + MARGIN, width + 2 * MARGIN), np.float32),
         steps=np.zeros((2, width + 4), np.int32),

@@ -129,14 +129,14 @@ def encode(values, void, *, options, threads=None, progress=SILENT):
             0, values.shape[0], 0, values.shape[1], progress=Muted(progress)
         )
         if options.max_error is not None:
-            weights = fitted(
+            weights, _ = fitted(
                 shifted, void, below, tiling, error=options.max_error, plain=plain, threads=threads,
                 tiles=sampled_tiles(void, tiling, options.effort), progress=Muted(progress),
             )  # fmt: skip
     else:
         analysis = Analysis(surface, tiling, LEVELS)
         if options.max_error is not None:
-            tree, weights = best_tree(
+            tree, plain, weights = best_tree(
                 analysis, shifted, void, tiling, error=options.max_error, plain=plain,
                 effort=options.effort,
                 **work,

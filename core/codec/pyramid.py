@@ -19,7 +19,14 @@ import numpy as np
 
 from demsmith.core import parallel
 from demsmith.core.codec import _details, _residual
-from demsmith.core.codec._coder import buffer_for, close_stream, coding_room, open_stream
+from demsmith.core.codec._coder import (
+    INPUTS,
+    SIZE_WEIGHT_SETS,
+    buffer_for,
+    close_stream,
+    coding_room,
+    open_stream,
+)
 from demsmith.core.codec._details import PAD
 from demsmith.core.codec._wavelet import SUPPORT, forward, inverse
 from demsmith.core.codec.priors import primed
@@ -163,7 +170,7 @@ def _code_root(root, part):
 
 
 def _room():
-    room = coding_room(_details.STATES, _details.INPUTS, _details.WEIGHT_SETS)
+    room = coding_room(_details.STATES, INPUTS, SIZE_WEIGHT_SETS)
     return primed("details", room)
 
 
@@ -183,7 +190,7 @@ def code_bands(bands, levels, finest, part, room):
             blank = np.zeros_like(band)
             _details.code_band(
                 band, parents[kind], three[0] if kind else blank, three[1] if kind > 1 else blank,
-                kind, min(level - 1, 7), at=np.zeros(_details.INPUTS, np.int64), data=data,
+                kind, min(level - 1, 7), at=np.zeros(INPUTS, np.int64), data=data,
                 decoding=part is not None, **room,
             )  # fmt: skip
         parents = three

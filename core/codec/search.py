@@ -34,6 +34,7 @@ def best_tree(
     tiling : Tiling
     error : int
     plain : int or None
+        From `residual.plain_of`; trials tell whether it helps.
     effort : str
         ``low``, ``normal`` or ``high``.
     threads, progress
@@ -42,27 +43,26 @@ def best_tree(
     Returns
     -------
     PyramidTree
+    plain : int or None
     weights : float32 array
-        For `encode_residual`.
+        Both for `encode_residual`.
     """
     factors = _FAINT[effort] + (_DENSE[effort] if error >= _SMALLEST_DENSE else ())
     tiles = sampled_tiles(void, tiling, effort)
     best = None
     work = dict(tiles=tiles, threads=threads, progress=Muted(progress))
-    bounds = dict(error=error, plain=plain)
     for done, factor in enumerate(factors):
         checkpoint(progress, done / len(factors))
         tree = analysis.tree(factor * (2 * error + 1))
         surface = tree.surface()
-        weights = fit_weights(values, void, surface, _rounded(values, error))
-        parts, _ = encode_residual(values, void, surface, tiling, weights, **bounds, **work)
         coded = tree.sections(**work)
-        size = sum(map(len, parts)) + sum(map(len, coded["tree"]))
-        size += len(coded["root"][0]) * len(tiles) / tiling.count
-        if best is None or size < best[0]:
-            best = size, tree, surface
-    tree, surface = best[1:]
-    return tree, fitted(values, void, surface, tiling, **bounds, **work)
+        base = sum(map(len, coded["tree"]))
+        base += len(coded["root"][0]) * len(tiles) / tiling.count
+        for level in dict.fromkeys((plain, None)):
+            weights, size = fitted(values, void, surface, tiling, error=error, plain=level, **work)
+            if best is None or base + size < best[0]:
+                best = base + size, tree, level, weights
+    return best[1:]
 
 
 def sampled_tiles(void, tiling, effort):
@@ -75,24 +75,29 @@ def sampled_tiles(void, tiling, effort):
 def fitted(values, void, surface, tiling, *, error, plain, tiles, threads=None, progress=SILENT):
     """Learn the prediction's weights from some tiles, coded as they will be.
 
-    Neighbours carry the errors that coding makes, which depend on the weights: hence twice.
+    Neighbours carry the errors that coding makes, which depend on the weights: so they are
+    learned again from tiles that were coded, and kept if that makes these tiles smaller. (Where a
+    tree leaves little, coded cells repeat what was predicted, and teach it.)
 
     Returns
     -------
-    float32 array
+    weights : float32 array
+    size : int
+        Bytes of these tiles' residual.
     """
+    more = dict(error=error, plain=plain, tiles=tiles, threads=threads, progress=progress)
     weights = fit_weights(values, void, surface, _rounded(values, error))
+    parts, decoded = encode_residual(values, void, surface, tiling, weights, **more)
+    size = sum(map(len, parts))
     if not error:
-        return weights
-    _, decoded = encode_residual(
-        values, void, surface, tiling, weights, error=error, plain=plain, tiles=tiles,
-        threads=threads, progress=progress,
-    )  # fmt: skip
+        return weights, size
     elsewhere = np.ones_like(void)
     for tile in tiles:
         rows, columns = tiling.slices(tile)
         elsewhere[rows, columns] = void[rows, columns]
-    return fit_weights(values, elsewhere, surface, decoded)
+    again = fit_weights(values, elsewhere, surface, decoded)
+    parts, _ = encode_residual(values, void, surface, tiling, again, **more)
+    return min((weights, size), (again, sum(map(len, parts))), key=lambda pair: pair[1])
 
 
 def _rounded(values, error):

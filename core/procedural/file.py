@@ -27,6 +27,7 @@ import numpy as np
 from demsmith.core.errors import InputError
 from demsmith.core.noise import MOST_TERMS, NoiseSums
 from demsmith.core.procedural.terrain import ProceduralTerrain
+from demsmith.core.progress import SILENT
 from demsmith.core.raster import BandMeta, Grid, Raster
 from demsmith.core.sectioned import Kind, open_sectioned, write_sectioned
 from demsmith.core.sparse import PatchGrid
@@ -63,7 +64,7 @@ class PlacedTerrain:
     unit: str = ""
     area_or_point: str = ""
 
-    def raster(self, *, scale=1.0, threads=None, progress):
+    def raster(self, *, scale=1.0, threads=None, progress=SILENT):
         """Evaluate the terrain as a raster; see `ProceduralTerrain.evaluate`."""
         values = self.terrain.evaluate(scale=scale, threads=threads, progress=progress)
         x, width, _, y, _, height = self.grid.geotransform

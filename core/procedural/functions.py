@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from demsmith.core.noise import NoiseSums
+from demsmith.core.progress import SILENT
 
 _COARSEST, _FINEST = 16.0, 1.0
 """Wavelengths of noises, in radii: within a disc, the longest are hardly more than a slope."""
@@ -62,7 +63,7 @@ def random_functions(count, *, families, terms, grid, seed):
     return NoiseSums(np.resize(families, count), seeds, amplitudes, wavelengths)
 
 
-def sampled(sums, grid, *, threads=None, progress):
+def sampled(sums, grid, *, threads=None, progress=SILENT):
     """Sample functions at the cells of a disc.
 
     Parameters

@@ -128,7 +128,7 @@ class SctFile:
                 self._tiling = Tiling(tuple(self.grid.shape), _TILE)
                 if tuple(self.decoder.shape) != tuple(self.grid.shape):
                     raise InputError("header and codec speak of different sizes")
-                self._check_marks()
+                self._check_counts()
         except BaseException:
             self.close()
             raise
@@ -200,8 +200,7 @@ class SctFile:
         level : int
             From 1 to `LEVELS`.
         rows, columns : slice
-            On the lattice of the level. Of a pyramid, it lies at every ``2**level``-th cell of the
-            raster, from the first one on; of patches, its values are means of as many cells.
+            Of the overview, whose cells are squares of ``2**level`` by ``2**level`` cells.
         progress : Progress
 
         Returns
@@ -313,9 +312,12 @@ class SctFile:
         )
         return classes[top:bottom, left:right]
 
-    def _check_marks(self):
-        if self._sections.counts.get(_MARKS, self._tiling.count) != self._tiling.count:
-            raise InputError("the values of its voids are not those of this raster")
+    def _check_counts(self):
+        """Refuse a file that has not a part for each tile, before any work is done for it."""
+        by_tile = dict.fromkeys(("voids", "tree", "residual"), self.decoder.tiling.count)
+        for name, count in (by_tile | {_MARKS: self._tiling.count}).items():
+            if self._sections.counts.get(name, count) != count:
+                raise InputError(f"its section '{name}' has not {count} parts, one for each tile")
 
     @contextlib.contextmanager
     def _told(self):

@@ -105,8 +105,8 @@ class PatchMaker:
             threads=threads, progress=Span(progress, 0.5, 0.6),
         )  # fmt: skip
         return patch_base.encode(
-            surface, void, tree=tree, step=self._step(surface, void, tree, threads), sweeps=_SWEEPS[self.effort], threads=threads,
-            progress=Span(progress, 0.6, 1),
+            surface, void, tree=tree, step=self._step(surface, void, tree, threads),
+            sweeps=_SWEEPS[self.effort], threads=threads, progress=Span(progress, 0.6, 1),
         )  # fmt: skip
 
     def _step(self, surface, void, tree, threads):

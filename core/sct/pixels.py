@@ -39,7 +39,7 @@ def read(
     InputError
         If the file cannot be read; GDAL shows it as its own error.
     """
-    sct = _opened(file.decode())
+    sct = _opened(os.fsdecode(file))
     rows, columns = slice(yoff, yoff + ysize), slice(xoff, xoff + xsize)
     if out_ar.shape == (ysize, xsize):
         out_ar[:] = sct.read(rows, columns).values

@@ -54,12 +54,16 @@ def decoded_at(file, rows, columns, scale, *, threads=None, progress=SILENT):
         read = file.read(rows, columns, progress=progress)
         return replace(read, meta=meta), notes
     shape = Shape(*(max(1, round(side * scale)) for side in grid.shape))
+    too_many = InputError(
+        f"{shape.rows} × {shape.columns} cells at scale {scale:g} are more than can be made at "
+        "once: choose a smaller scale, or a window"
+    )
     if shape.rows * shape.columns > _MOST_CELLS:
-        raise InputError(
-            f"{shape.rows} × {shape.columns} cells at scale {scale:g} are more than "
-            f"{_MOST_CELLS}: choose a smaller scale, or a window"
-        )
-    values, void = resampled(file, rows, columns, shape, threads=threads, progress=progress)
+        raise too_many
+    try:
+        values, void = resampled(file, rows, columns, shape, threads=threads, progress=progress)
+    except MemoryError:
+        raise too_many from None
     x, width, row_shear, y, column_shear, height = grid.geotransform
     if grid.georeferenced:
         width *= grid.shape.columns / shape.columns
@@ -121,12 +125,9 @@ def resampled(file, rows, columns, shape, *, threads=None, progress=SILENT):
     ratios = [_length(side) / count for side, count in zip(window, shape, strict=True)]
     level = max(0, math.floor(math.log2(min(ratios)) + 1e-9))
     if level and file.shows_overviews:
-        level = min(level, LEVELS)
-        overview, shift = _tree_cells, 0.0
+        level, overview = min(level, LEVELS), _tree_cells
     else:
         overview = _mean_cells
-    if overview is _mean_cells or file.decoder.tree == "patches":
-        shift = 0.5 - 0.5 / (1 << level)  # means are of blocks, not at their first cells
     coarser = math.ceil(max(0.0, math.log2(max(ratios) / (1 << level)) - 1e-9))
     near = [
         _reach(side, level, whole, 1 << coarser)
@@ -143,7 +144,7 @@ def resampled(file, rows, columns, shape, *, threads=None, progress=SILENT):
     values = np.zeros(shape)
     if not (void.all() or unknown.all()):
         places = [
-            np.clip(each / (1 << level) - shift - side.start, -0.5, _length(side) - 0.5)
+            np.clip((each + 0.5) / (1 << level) - 0.5 - side.start, -0.5, _length(side) - 0.5)
             for each, side in zip(centres, near, strict=True)
         ]
         detail = max(1.0, max(ratios) / (1 << level))

@@ -38,8 +38,9 @@ PRECISIONS = ("float32", "float16", "int8")
 MEMORY_BOUND = 3 << 30
 """Bytes that reading a file never exceeds."""
 
-_MOST_STORED = 1 << 30
-"""Bytes of all arrays of a file together, at most."""
+_MOST_STORED = 512 << 20
+"""Bytes of all arrays of a file together once they are unpacked, at most; reading holds them as
+chunks, joined, and decoded."""
 
 _CHUNK = 1 << 20
 """Bytes of a section's part before it is deflated, about."""
@@ -168,7 +169,7 @@ class _Writer:
         return {"kind": "functions", "atoms": len(sums), "terms": sums.amplitudes.shape[1]}
 
     def _put(self, section, array):
-        self.stored += array.nbytes
+        self.stored += array.size * max(array.itemsize, 4)
         array = np.ascontiguousarray(array)
         step = _rows_a_chunk(array.shape, array.dtype)
         self.sections[section] = [
@@ -270,7 +271,7 @@ class _Reader:
 
     def _array(self, section, shape, kind):
         """Read an array; nothing is unpacked before all of it is known to be wanted."""
-        self.stored += math.prod(shape) * kind.itemsize
+        self.stored += math.prod(shape) * max(kind.itemsize, 4)
         if self.stored > _MOST_STORED:
             raise InputError(
                 f"'{self.file.path}' tells of more than {_MOST_STORED >> 20} MB of atoms and "

@@ -25,6 +25,9 @@ from demsmith.core.sparse.pursuit import pursue
 _BLOCK = 4096
 """Samples of a task."""
 
+_COMPARED = 1024
+"""Atoms that are compared with all others at once."""
+
 _ALIKE = 0.99
 """Cosine of the angle above which two atoms are one too many."""
 
@@ -331,7 +334,11 @@ class _Learner:
 
     def _renew(self):
         """Spend atoms that hardly any sample uses, or that others double, on the worst samples."""
-        likeness = np.abs(np.tril(self.atoms @ self.atoms.T, -1)).max(axis=1)
+        likeness = np.zeros(len(self.atoms))  # to those before
+        for first in range(0, len(self.atoms), _COMPARED):
+            part = np.s_[first : first + _COMPARED]
+            products = np.tril(self.atoms[part] @ self.atoms[: part.stop].T, first - 1)
+            likeness[part] = np.abs(products).max(axis=1)
         spare = np.flatnonzero((np.diff(self.firsts) < _FEWEST_USERS) | (likeness > _ALIKE))
         if not spare.size:
             return

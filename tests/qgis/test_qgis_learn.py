@@ -64,8 +64,8 @@ def learn(plugin, tmp_path):
 
 @pytest.fixture(scope="module")
 def large(tmp_path_factory):
-    """Make a raster of a million cells."""
-    values = np.rint(fractal((1025, 1025), seed=1)).astype(np.int16)
+    """Make a raster on which learning takes a second or two."""
+    values = np.rint(fractal((513, 513), seed=1)).astype(np.int16)
     return make_raster(tmp_path_factory.mktemp("large") / "large.tif", values)
 
 
