@@ -147,7 +147,7 @@ def code_tile(
                         + 32 * np.int64(z[row - 2, column] == plain)
                     )  # fmt: skip
                 away = abs(guess - np.float32(plain)) * scale
-                if near or away < np.float32(0.6):
+                if near or away < np.float32(0.3):
                     slot = _PLAINS + near * 8 + half_octaves(away, 8)
                     level_with = (
                         np.int64(1) if abs(z[row, column] - plain) <= error else np.int64(0)

@@ -333,8 +333,12 @@ class Decoder:
             values[place] = whole + self._offset
             return
         tiles = list(self.tiling.overlapping(*block))
-        cells = [self.tiling.slices(tile) for tile in tiles]
-        # Tiles are decoded whole; the tree below them reaches a cell beyond, within the raster.
+        # Tiles are decoded from their first row to the last that is asked for. The tree below them
+        # reaches a cell beyond, within the raster.
+        cells = [
+            (slice(down.start, min(down.stop, block[0][1])), across)
+            for down, across in map(self.tiling.slices, tiles)
+        ]
         outer = tuple(
             (max(min(part[axis].start for part in cells) - 1, 0),
              min(max(part[axis].stop for part in cells) + 1, self.shape[axis]))
@@ -345,10 +349,10 @@ class Decoder:
 
         def decode(tile, part):
             around = _with_border(surface, corner, part, self.shape)
-            known = self._tile_voids(tile)
+            rows_in = part[0].stop - part[0].start
             decoded = decode_residual(
-                known, around, self._weights, error=self.max_error, plain=self._plain,
-                part=self._part("residual", tile),
+                self._tile_voids(tile)[:rows_in], around, self._weights, error=self.max_error,
+                plain=self._plain, part=self._part("residual", tile),
             )  # fmt: skip
             to, inner = _meeting(part, rows, columns)
             values[to] = decoded[inner].astype(np.int64) + self._offset

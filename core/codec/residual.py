@@ -70,11 +70,12 @@ def encode_residual(
 
 
 def decode_residual(void, around, weights, *, error, plain=None, part):
-    """Decode a tile.
+    """Decode a tile, or its first rows.
 
     Parameters
     ----------
     void : bool (h, w)
+        Of as many rows as are wanted.
     around : float32 (h + 2, w + 2)
         The tree's surface with a cell around; beyond the raster its edge goes on.
     weights, error, plain

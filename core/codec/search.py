@@ -18,7 +18,8 @@ _FAINT = {"low": (150.0,), "normal": (600.0, 100.0, 20.0), "high": (600.0, 200.0
 _DENSE = {"low": (1.5,), "normal": (2.2, 1.5, 1.1), "high": (4.0, 2.6, 2.0, 1.6, 1.3, 1.1, 0.9)}
 _SMALLEST_DENSE = 3  # units of error, below which dense trees never paid
 
-_ROUNDS = 14  # halvings of an interval of steps
+_ROUNDS = 14  # trials of steps for an error or a size
+_NEARLY = 0.995  # of the size that is allowed
 
 
 def best_tree(
@@ -127,26 +128,35 @@ def tree_of_bytes(analysis, size, *, threads=None, progress=SILENT):
     InputError
         If none is so small.
     """
-    rounds = iter(range(2 * _ROUNDS))
+    trials = []  # (logarithm of the step, of the size), by step
 
-    def too_large(step):
-        checkpoint(progress, min(next(rounds) / _ROUNDS, 1))
+    def tried(step):
+        checkpoint(progress, min(len(trials) / _ROUNDS, 1))
         tree = analysis.tree(step)
         sections = tree.sections(threads=threads, progress=Muted(progress))
         taken = sum(len(part) for parts in sections.values() for part in parts)
-        return taken > size, tree
+        trials.append((math.log(step), math.log(taken)))
+        trials.sort()
+        return tree, taken
 
-    low, high = 2.0**-6, 2.0**30
-    small, tree = too_large(high)
-    if small:
+    tree, taken = tried(2.0**30)
+    if taken > size:
         raise InputError(f"no tree is as small as {size} bytes; allow more")
-    for _ in range(_ROUNDS + 4):
-        middle = math.sqrt(low * high)
-        large, made = too_large(middle)
-        if large:
-            low = middle
-        else:
-            high, tree = middle, made
+    finest, taken = tried(2.0**-6)
+    if taken <= size:
+        return finest
+    # Sizes fall about like a power of the step: where that puts the one wanted, but not so near
+    # to an end of the interval that the next trial would tell little.
+    for _ in range(_ROUNDS):
+        wide = [at for at, taken in trials if taken > math.log(size)]
+        narrow = [at for at, taken in trials if taken <= math.log(size)]
+        (low, much), (high, little) = trials[len(wide) - 1], trials[len(trials) - len(narrow)]
+        share = (much - math.log(size)) / (much - little)
+        made, taken = tried(math.exp(low + (high - low) * min(max(share, 0.1), 0.9)))
+        if taken <= size:
+            tree = made
+            if taken > _NEARLY * size:
+                break
     return tree
 
 
