@@ -17,7 +17,7 @@ _FINEST_STEP = 1e-3
 _ROUNDS = {"low": 8, "normal": 30, "high": 60}
 """Of learning, at most, by effort."""
 
-_SWEEPS = {"low": 0, "normal": 4, "high": 8}
+_SWEEPS = {"low": 0, "normal": 2, "high": 8}
 """Of the joint refinement of means and coefficients, by effort."""
 
 
@@ -96,11 +96,13 @@ class PatchMaker:
         """
         from demsmith.core.codec import patch_base
         from demsmith.core.sparse import PatchGrid, decompose
+        from demsmith.core.sparse.weighted import decompose_weighted
 
         sparsity = self.sparsity or _SPARSITY
         atoms, sides = self._atoms(surface, void, sparsity, threads, Span(progress, 0, 0.5))
         grid = PatchGrid(surface.shape, *sides, *(max(1, side // 2) for side in sides))
-        tree = decompose(
+        pursue = decompose if self.effort == "low" else decompose_weighted
+        tree = pursue(
             surface, void, dictionary=atoms, sparsity=min(sparsity, len(atoms)), grid=grid,
             threads=threads, progress=Span(progress, 0.5, 0.6),
         )  # fmt: skip
