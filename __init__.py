@@ -39,6 +39,8 @@ _PUBLIC = {
     "proceduralize_file": "demsmith.core.procedural",
     "read_terrain": "demsmith.core.procedural",
     "read_dictionary": "demsmith.core.sparse",
+    "CompressOptions": "demsmith.core.sct",
+    "DecompressOptions": "demsmith.core.sct",
     "compress_file": "demsmith.core.sct",
     "decompress_file": "demsmith.core.sct",
     "open_sct": "demsmith.core.sct",

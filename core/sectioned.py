@@ -72,6 +72,13 @@ class Kind:
     noun: str
 
 
+TREE = Kind(b"\x93SCT", 1, "Sparse Construction Tree (.sct)")
+DICTIONARY = Kind(b"DSD\x1a", 1, "dictionary (.dsd)")
+TERRAIN = Kind(b"DSP\x1a", 1, "procedural terrain (.dsp)")
+
+_KINDS = (TREE, DICTIONARY, TERRAIN)
+
+
 def write_sectioned(path, kind, *, header, sections):
     """Write a sectioned file, whole or not at all.
 
@@ -239,6 +246,11 @@ class SectionedFile:
     def _open(self, kind):
         preamble = self._read(0, min(_PREAMBLE.size + _CRC.size, self.size))
         if preamble[:4] != kind.magic:
+            for other in _KINDS:
+                if preamble[:4] == other.magic:
+                    raise InputError(
+                        f"'{self.path}' is a {other.noun}; what is read here is a {kind.noun}"
+                    )
             raise InputError(f"'{self.path}' is no {kind.noun}, or its beginning is damaged")
         if len(preamble) < _PREAMBLE.size + _CRC.size:
             raise self._truncated()
@@ -316,7 +328,9 @@ class SectionedFile:
             with self._lock:
                 self._file.seek(begin)
                 data = self._file.read(count)
-        except (OSError, ValueError) as error:  # ValueError: it was closed
+        except ValueError:
+            raise InputError(f"'{self.path}' is closed: open it again to read it") from None
+        except OSError as error:
             raise InputError(f"'{self.path}' cannot be read: {error}") from None
         if len(data) != count:
             raise self._truncated()

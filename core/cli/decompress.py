@@ -5,10 +5,15 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from demsmith.core.cli.common import VERB, Run
-from demsmith.core.cli.parameters import parameters
+from demsmith.core.cli.parameters import parameters, whole_number
 from demsmith.core.sct import DecompressOptions, decompress_file
 
 _Options = parameters(DecompressOptions, group=VERB, advanced=VERB)
+
+
+def _whole_numbers(kind, tokens):
+    return tuple(whole_number(kind, [token]) for token in tokens)
+
 
 app = App(
     name="decompress",
@@ -36,6 +41,7 @@ def decompress(
         Parameter(
             group=VERB,
             metavar="XOFF YOFF XSIZE YSIZE",
+            converter=_whole_numbers,
             show_default=False,
             help="First column and row, number of columns and rows to decode. Default: all.",
         ),

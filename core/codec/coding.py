@@ -138,13 +138,12 @@ def encode(values, void, *, options, threads=None, progress=SILENT):
         if options.max_error is not None:
             tree, plain, weights = best_tree(
                 analysis, shifted, void, tiling, error=options.max_error, plain=plain,
-                effort=options.effort,
-                **work,
+                effort=options.effort, **work,
             )  # fmt: skip
         elif options.bytes is not None:
             tree = tree_of_bytes(analysis, options.bytes, **work)
         else:
-            tree = tree_of_rmse(analysis, surface, void, options.rmse)
+            tree = tree_of_rmse(analysis, surface, void, options.rmse, progress=work["progress"])
         params |= dict(tree="pyramid", levels=LEVELS, step=float(tree.step))
         sections |= tree.sections(threads=threads, progress=Span(progress, 0.5, 0.6))
         below = tree.surface()

@@ -256,7 +256,8 @@ class Pyramid:
         """Give means of about ``2^level`` × ``2^level`` cells, from the levels that they need.
 
         A level's lattice stands on the first cells of such squares, their middles lie half a
-        square on: they are made from the lattice that is twice as fine.
+        square on. So means are made from the lattice that is four times as fine (or from the cells:
+        then they are exact), with weights whose middle is the square's.
 
         Parameters
         ----------
@@ -270,21 +271,27 @@ class Pyramid:
         -------
         float32 (rows, columns)
         """
-        fine = self._geometry.shapes[level - 1]
-        reach = 1 if level == 1 else 2  # beyond a square's first place
+        finer = max(level - 2, 0)
+        size = 1 << (level - finer)
+        weights = np.full(size + 1, 1 / size, np.float32)
+        # A place of the finer lattice is 2^finer cells from the next, but its first cell's.
+        weights[0] = (1 + 1 / (1 << finer)) / (2 * size)
+        weights[-1] = (1 - 1 / (1 << finer)) / (2 * size)
         spans = [
-            (2 * start, min(2 * stop - 1 + reach, end))
-            for (start, stop), end in zip((rows, columns), fine, strict=True)
+            (size * start, min(size * stop + 1, end))
+            for (start, stop), end in zip(
+                (rows, columns), self._geometry.shapes[finer], strict=True
+            )
         ]
-        means = self.window(*spans, level=level - 1, progress=progress)
+        means = self.window(*spans, level=finer, progress=progress)
         for axis, (start, stop) in enumerate((rows, columns)):
-            count = stop - start
-            places = np.minimum(2 * np.arange(count)[:, None] + np.arange(reach + 1),
-                                means.shape[axis] - 1)  # fmt: skip
-            first, *between, last = (np.take(means, place, axis) for place in places.T)
-            means = (first + last) * np.float32(0.5)
-            if between:
-                means = (means + between[0]) * np.float32(0.5)
+            first = size * np.arange(stop - start)
+            last = means.shape[axis] - 1
+            parts = (
+                np.take(means, np.minimum(first + k, last), axis) * weights[k]
+                for k in range(size + 1)
+            )
+            means = sum(parts, start=np.float32(0))
         return means
 
     def _root_values(self):

@@ -107,17 +107,21 @@ def _rounded(values, error):
     return np.rint(values / np.float32(step)).astype(np.int32) * np.int32(step)
 
 
-def tree_of_rmse(analysis, surface, void, rmse):
+def tree_of_rmse(analysis, surface, void, rmse, *, progress=SILENT):
     """Give the coarsest tree whose root mean square error at known cells is within ``rmse``."""
-    wanted = float(rmse)
-
-    def close_enough(step):
-        tree = analysis.tree(step)
-        wrong = (tree.surface() - surface)[~void].astype(np.float64)
-        return math.sqrt(np.mean(wrong**2)) <= wanted, tree
-
-    # An orthonormal transform's error is at most a step by the root of 12, at least far less.
-    return _coarsest(close_enough, wanted / 4, wanted * 1024)
+    # A step's error lies between a quarter of it, all coefficients rounded, and next to nothing.
+    low, high = float(rmse) / 4, float(rmse) * 1024
+    tree = analysis.tree(low)
+    for done in range(_ROUNDS):
+        checkpoint(progress, done / _ROUNDS)
+        middle = math.sqrt(low * high)
+        made = analysis.tree(middle)
+        wrong = (made.surface() - surface)[~void].astype(np.float64)
+        if math.sqrt(np.mean(wrong**2)) <= rmse:
+            low, tree = middle, made
+        else:
+            high = middle
+    return tree
 
 
 def tree_of_bytes(analysis, size, *, threads=None, progress=SILENT):
@@ -157,17 +161,4 @@ def tree_of_bytes(analysis, size, *, threads=None, progress=SILENT):
             tree = made
             if taken > _NEARLY * size:
                 break
-    return tree
-
-
-def _coarsest(close_enough, low, high):
-    """Give the tree of the largest step that is close enough, by halving an interval."""
-    _, tree = close_enough(low)
-    for _ in range(_ROUNDS):
-        middle = math.sqrt(low * high)
-        close, made = close_enough(middle)
-        if close:
-            low, tree = middle, made
-        else:
-            high = middle
     return tree

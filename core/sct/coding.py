@@ -21,6 +21,15 @@ _ROWS = 256
 _OVERHEAD = 500
 """Bytes of a file besides what is coded, to begin with."""
 
+_BYTES_WORTH_A_TRY = 0.2
+"""For each cell: where so many are allowed, all values may be kept."""
+
+_ROUNDING = 0.5
+"""Root mean square error in units below which rounding to units is most of it."""
+
+_LEAST_RMSE = 0.01
+"""The least that a tree alone is asked for, in units."""
+
 _TRIES = 4
 """Encodings after which a size or a PSNR that is missed by little is given up."""
 
@@ -176,6 +185,10 @@ class _Work:
             f"it cannot be made as small as a ratio of {self._wanted:g} asks, {int(most)} bytes: "
             "ask for less"
         )
+        if most >= _BYTES_WORTH_A_TRY * self._units.size:
+            whole = self._without_loss(_share(progress, 0))
+            if whole is not None and stored_size(**whole.parts()) <= most:
+                return whole
         target = most - _OVERHEAD - self._bytes_of_voids()
         for number in range(_TRIES):
             try:
@@ -192,9 +205,13 @@ class _Work:
         """Encode until the PSNR is at least this."""
         low, high = self._range
         target = wanted
+        if self._in_units((high - low) / 10 ** (target / 20)) < _ROUNDING:
+            whole = self._without_loss(progress)
+            if whole is not None:
+                return whole
         for number in range(_TRIES):
-            rmse = (high - low) / 10 ** (target / 20)
-            made = self.tried({"rmse": self._in_units(rmse)}, _share(progress, number))
+            rmse = self._in_units((high - low) / 10 ** (target / 20))
+            made = self.tried({"rmse": max(rmse, _LEAST_RMSE)}, _share(progress, number))
             reached = made.made.psnr
             if reached is None or reached >= wanted:
                 return made
@@ -203,6 +220,15 @@ class _Work:
             f"a PSNR of {wanted:g} dB is not reached, {reached:.2f} dB is; ask for a maximum error "
             "instead"
         )
+
+    def _without_loss(self, progress):
+        """Keep every value, if the unit allows it: else None."""
+        if self._quantisation.unit != 1:
+            return None
+        self._error = 0
+        whole = self.tried({}, progress)
+        self._error = None
+        return whole
 
     def _bytes_of_voids(self):
         from demsmith.core.codec.coding import TILE

@@ -1,6 +1,7 @@
 """`.sct` files: a coded raster with all that its input said, written and opened."""
 
 import contextlib
+import operator
 import os
 
 import numpy as np
@@ -12,9 +13,8 @@ from demsmith.core.progress import SILENT, Span, checkpoint
 from demsmith.core.raster import Raster
 from demsmith.core.sct import header
 from demsmith.core.sct.marks import packed_classes, unpacked_classes
-from demsmith.core.sectioned import Kind, open_sectioned, sectioned_size, write_sectioned
-
-KIND = Kind(b"\x93SCT", 1, "Sparse Construction Tree (.sct)")
+from demsmith.core.sectioned import TREE as KIND
+from demsmith.core.sectioned import open_sectioned, sectioned_size, write_sectioned
 
 LEVELS = 5
 """The coarsest overview has ``1 / 2**LEVELS`` of the resolution."""
@@ -159,7 +159,7 @@ class SctFile:
         Parameters
         ----------
         rows, columns : slice, optional
-            Default: all.
+            Ends may be open, or negative: counted from the last. Default: all.
         progress : Progress
 
         Returns
@@ -171,12 +171,13 @@ class SctFile:
         Raises
         ------
         InputError
-            If the window is empty or reaches beyond the raster, or the file is damaged.
+            If the window is empty, reaches beyond the raster or leaves cells out, or the file is
+            damaged or closed.
         Cancelled
             If ``progress`` asks to stop.
         """
-        rows = rows or slice(0, self.grid.shape.rows)
-        columns = columns or slice(0, self.grid.shape.columns)
+        rows = _whole_slice("rows", rows, self.grid.shape.rows)
+        columns = _whole_slice("columns", columns, self.grid.shape.columns)
         grid = self.grid.part(rows, columns)
         with self._told():
             units, void = self.decoder.window(
@@ -186,11 +187,16 @@ class SctFile:
         checkpoint(progress, 1)
         return Raster(values, void, grid, self.meta, source=self.path)
 
-    @property
-    def shows_overviews(self):
-        """Whether the tree alone is about as right as the file, so that its levels can be shown."""
-        made = self.made
-        return made.mode != "max-error" or made.tree_rmse <= 2 * made.wanted
+    def shows_level(self, level):
+        """Whether a level of the tree alone is right enough to be shown.
+
+        A file without a maximum error has nothing better. Where there is one, a level's means are
+        of ``2**level`` by ``2**level`` cells, and their error that much smaller than the tree's.
+        """
+        if self.decoder.max_error is None:
+            return level >= 1
+        bound = self.made.wanted if self.made.mode == "max-error" else 0
+        return level >= 2 and self.made.tree_rmse <= bound * 2 ** (level - 2)
 
     def overview(self, level, rows, columns, *, progress=SILENT):
         """Decode the tree alone at ``1 / 2**level`` of the resolution.
@@ -334,6 +340,26 @@ class SctFile:
                 f"'{self.path}' has {self.grid.shape.rows} × {self.grid.shape.columns} cells, more "
                 "than the memory holds; decode a window of it"
             ) from None
+
+
+def _whole_slice(name, given, count):
+    """Give the same slice with both ends, counted from the first of so many.
+
+    Other than by `slice.indices`, ends beyond the raster stay there, to be refused.
+    """
+    if given is None:
+        return slice(0, count)
+    wrong = InputError(
+        f"{name} is {given!r}; give a slice of whole numbers and no step, as slice(10, 20)"
+    )
+    if not isinstance(given, slice) or given.step not in (None, 1):
+        raise wrong
+    try:
+        start = 0 if given.start is None else operator.index(given.start)
+        stop = count if given.stop is None else operator.index(given.stop)
+    except TypeError:
+        raise wrong from None
+    return slice(*(end + count if -count <= end < 0 else end for end in (start, stop)))
 
 
 def _parts(encoded, grid, meta, quantisation, marks, classes, made):

@@ -1,5 +1,6 @@
 """From raster to `.sct` file and back, as the command line and QGIS do it."""
 
+import operator
 import os
 import time
 from dataclasses import dataclass, fields
@@ -134,6 +135,12 @@ def compress_file(
         if options.vrt:
             write_virtual(part["vrt"], outputs["output"], made.grid, made.meta)
         checkpoint(progress, 1.0)
+    notes = [*source.notes, *(f"'{source.source}': {note}" for note in made.notes)]
+    beside = virtual_path(output)
+    if not options.vrt and os.path.exists(beside):
+        notes.append(
+            f"'{beside}' describes the file that was here before: delete it, or write a new one"
+        )
     raw = source.values.nbytes
     return CompressResult(
         **outputs,
@@ -151,7 +158,7 @@ def compress_file(
         max_error_measured=made.made.max_error,
         rmse=made.made.rmse,
         psnr=made.made.psnr,
-        warnings=(*source.notes, *(f"'{source.source}': {note}" for note in made.notes)),
+        warnings=tuple(notes),
     )
 
 
@@ -280,5 +287,11 @@ def _window(file, window):
     """Give the rows and columns of a window, which `Grid.part` checks."""
     if window is None:
         return slice(0, file.grid.shape.rows), slice(0, file.grid.shape.columns)
-    column, row, width, height = window
+    try:
+        column, row, width, height = map(operator.index, window)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"window is {window!r}; give four whole numbers: first column, first row, number of "
+            "columns and number of rows"
+        ) from None
     return slice(row, row + height), slice(column, column + width)

@@ -92,9 +92,10 @@ def _meta_at(meta, rows, columns, scale, *, whole):
 def resampled(file, rows, columns, shape, *, threads=None, progress=SILENT):
     """Evaluate a window of an `.sct` file at the centres of larger or smaller cells.
 
-    Smaller ones are on the bicubic surface through the cells of the file. Larger ones are on that
-    of an overview: of the tree alone, decoded to the level that they can show, where that is about
-    as right as the file; else of means of cells.
+    Smaller ones are on the bicubic surface through the cells of the file, as are those of less than
+    two cells. Larger ones are means of the cells, or parts of cells, that they cover; but where the
+    tree alone is right enough, they are on the bicubic surface through the level of the tree that
+    they can show.
 
     Parameters
     ----------
@@ -124,23 +125,26 @@ def resampled(file, rows, columns, shape, *, threads=None, progress=SILENT):
     window = rows, columns
     ratios = [_length(side) / count for side, count in zip(window, shape, strict=True)]
     level = max(0, math.floor(math.log2(min(ratios)) + 1e-9))
-    if level and file.shows_overviews:
-        level, overview = min(level, LEVELS), _tree_cells
-    else:
-        overview = _mean_cells
-    coarser = math.ceil(max(0.0, math.log2(max(ratios) / (1 << level)) - 1e-9))
-    near = [
-        _reach(side, level, whole, 1 << coarser)
-        for side, whole in zip(window, file.grid.shape, strict=True)
-    ]
-    cells, unknown = overview(file, level, near, Span(progress, 0, 0.6))
     centres = [
         side.start + (np.arange(count) + 0.5) * ratio - 0.5
         for side, count, ratio in zip(window, shape, ratios, strict=True)
     ]
     void = file.voids_at(
-        *(np.floor(each + 0.5).astype(int) for each in centres), progress=Span(progress, 0.6, 0.7)
+        *(np.floor(each + 0.5).astype(int) for each in centres), progress=Span(progress, 0, 0.1)
     )
+    if not file.shows_level(level):
+        if level:  # at least two cells each way
+            values = _means(file, window, shape, Span(progress, 0.1, 1))
+            values[void] = 0
+            return values, void
+        level = 0
+    level = min(level, LEVELS)
+    coarser = math.ceil(max(0.0, math.log2(max(ratios) / (1 << level)) - 1e-9))
+    near = [
+        _reach(side, level, whole, 1 << coarser)
+        for side, whole in zip(window, file.grid.shape, strict=True)
+    ]
+    cells, unknown = _overview(file, level, near, Span(progress, 0.1, 0.7))
     values = np.zeros(shape)
     if not (void.all() or unknown.all()):
         places = [
@@ -165,40 +169,47 @@ def _reach(side, level, whole, block):
     return slice(first - first % block, stop)
 
 
-def _tree_cells(file, level, near, progress):
-    """Give the level of the tree."""
-    return file.overview(level, *near, progress=progress), np.zeros(tuple(map(_length, near)), bool)
+def _overview(file, level, near, progress):
+    """Give a level of the tree, or the cells themselves, and where there are none."""
+    if level:
+        cells = file.overview(level, *near, progress=progress)
+        return cells, np.zeros(cells.shape, bool)
+    read = file.read(*near, progress=progress)
+    return np.where(read.void, 0, read.values).astype(np.float64), read.void
 
 
-def _mean_cells(file, level, near, progress):
-    """Give means of ``2**level`` × ``2**level`` known cells, and where there is none."""
-    size = 1 << level
-    values = np.zeros(tuple(map(_length, near)))
-    void = np.ones(values.shape, bool)
-    rows, columns = (
-        slice(side.start * size, min(side.stop * size, whole))
-        for side, whole in zip(near, file.grid.shape, strict=True)
-    )
-    step = max(1, _ROWS // size)
-    for first in range(0, values.shape[0], step):
-        last = min(first + step, values.shape[0])
-        start, stop = rows.start + first * size, min(rows.start + last * size, rows.stop)
-        checkpoint(progress, first / values.shape[0])
-        read = file.read(slice(start, stop), columns, progress=Muted(progress))
-        values[first:last], void[first:last] = _means(read.values, read.void, size)
-    return values, void
+def _means(file, window, shape, progress):
+    """Give the mean of what is known of the cells, and parts of cells, under each larger cell."""
+    (rows, columns), height = window, shape[0]
+    edges = [
+        np.arange(count + 1) * (_length(side) / count)
+        for side, count in zip(window, shape, strict=True)
+    ]
+    means = np.zeros(shape)
+    step = max(1, int(_ROWS * height / _length(rows)))
+    for first in range(0, height, step):
+        checkpoint(progress, first / height)
+        lines = edges[0][first : first + step + 1]
+        top, bottom = int(lines[0]), min(math.ceil(lines[-1] - 1e-9), _length(rows))
+        read = file.read(
+            slice(rows.start + top, rows.start + bottom), columns, progress=Muted(progress)
+        )
+        known = ~read.void
+        sums = [
+            _between(_between(each, edges[1], 1), lines - top, 0)
+            for each in (np.where(known, read.values, 0).astype(np.float64), known.astype(float))
+        ]
+        means[first : first + step] = sums[0] / np.maximum(sums[1], 1e-9)
+    return means
 
 
-def _means(values, void, size):
-    if size == 1:
-        return np.where(void, 0, values), void
-    pad = tuple((0, -side % size) for side in values.shape)
-    known = np.pad(~void, pad)
-    filled = np.pad(np.where(void, 0, values).astype(np.float64), pad)
-    blocks = tuple(part for side in known.shape for part in (side // size, size))
-    count = known.reshape(blocks).sum(axis=(1, 3))
-    total = filled.reshape(blocks).sum(axis=(1, 3))
-    return total / np.maximum(count, 1), count == 0
+def _between(values, edges, axis):
+    """Sum values between edges, that of a cell which an edge cuts by its parts."""
+    total = np.insert(np.cumsum(values, axis=axis), 0, 0, axis=axis)
+    whole = np.minimum(edges.astype(int), values.shape[axis] - 1)
+    part = (edges - whole).reshape((-1, 1) if axis == 0 else -1)
+    at = np.take(total, whole, axis) * (1 - part) + np.take(total, whole + 1, axis) * part
+    return np.diff(at, axis=axis)
 
 
 def _evaluate(cells, unknown, places, detail, values, threads, progress):

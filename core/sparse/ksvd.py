@@ -366,7 +366,7 @@ def _checked(vectors):
 
 def _check_count(atoms, vectors):
     if not 1 <= atoms <= len(vectors):
-        raise InputError(f"{atoms} atoms cannot be learned from {len(vectors)} samples")
+        raise TooLittleToLearnFrom(f"{atoms} atoms cannot be learned from {len(vectors)} samples")
 
 
 def _unit(vectors):
