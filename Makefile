@@ -48,7 +48,7 @@ lint: $(VENV)/test.stamp ## style and the direction of imports
 	@$(PY) -m flake8
 	@$(VENV)/bin/lint-imports --no-logo --no-cache
 
-bench: $(VENV)/test.stamp ## measure against the peers in the same run: filling, samples, tuning, reconstruction, sunlight
+bench: $(VENV)/test.stamp ## measure against the peers in the same run: filling, samples, tuning, reconstruction, sunlight, drainage, compression
 	@$(PY) benchmarks/fill.py
 	@$(PY) benchmarks/mcmd.py
 	@$(PY) benchmarks/tuning.py
@@ -56,6 +56,9 @@ bench: $(VENV)/test.stamp ## measure against the peers in the same run: filling,
 	@$(PY) benchmarks/voids_auxiliary.py
 	@$(PY) benchmarks/solar.py
 	@$(PY) benchmarks/drainage.py
+	@$(PY) benchmarks/compression.py
+	@$(PY) benchmarks/dictionaries.py
+	@$(PY) benchmarks/procedural.py
 
 zip: ## the plugin as QGIS installs it, from the last commit (REVISION=… for another)
 	@mkdir -p "$(DIST)"

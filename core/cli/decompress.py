@@ -42,6 +42,7 @@ def decompress(
             group=VERB,
             metavar="XOFF YOFF XSIZE YSIZE",
             converter=_whole_numbers,
+            negative=(),
             show_default=False,
             help="First column and row, number of columns and rows to decode. Default: all.",
         ),

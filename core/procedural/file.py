@@ -29,10 +29,10 @@ from demsmith.core.noise import MOST_TERMS, NoiseSums
 from demsmith.core.procedural.terrain import ProceduralTerrain
 from demsmith.core.progress import SILENT
 from demsmith.core.raster import BandMeta, Grid, Raster
-from demsmith.core.sectioned import Kind, open_sectioned, write_sectioned
+from demsmith.core.sectioned import TERRAIN as KIND
+from demsmith.core.sectioned import open_sectioned, write_sectioned
 from demsmith.core.sparse import PatchGrid
 
-KIND = Kind(b"DSP\x1a", 1, "procedural terrain (.dsp)")
 EXTENSION = ".dsp"
 
 MEMORY_BOUND = 2 << 30

@@ -9,7 +9,7 @@ import numpy as np
 import demsmith
 from demsmith.core import raster
 from demsmith.core.errors import InputError
-from demsmith.core.options import validate
+from demsmith.core.options import specifications, validate
 from demsmith.core.procedural.file import EXTENSION, PlacedTerrain, read_terrain, write_terrain
 from demsmith.core.procedural.options import OutputOptions, ProceduralizeOptions
 from demsmith.core.procedural.terrain import proceduralize
@@ -73,14 +73,14 @@ def proceduralize_file(
     input : path
         Anything `demsmith.read_raster` reads, which also explains ``band``, ``nodata``,
         ``below``, ``above`` and ``mask``; or a model, ``.dsp``, for which these, ``output`` and
-        ``options`` have no meaning.
+        ``options`` must be left out.
     output : path, optional
         The model, ``.dsp``: the functions' parameters and which of them each disc has.
     raster_output : path, optional
         GeoTIFF of the model's elevations, float32 with voids as not-a-number.
     options : ProceduralizeOptions, optional
     outputs : OutputOptions, optional
-        Resolution of ``raster_output``.
+        Resolution of ``raster_output``, without which they must be left out.
     threads : int, optional
         Default: one for each core. The outputs do not depend on it.
     overwrite : bool
@@ -96,8 +96,8 @@ def proceduralize_file(
     Raises
     ------
     InputError
-        If the input cannot be used, has nothing but voids, an option is out of range, or nothing
-        is asked for.
+        If the input cannot be used, has nothing but voids, an option is out of range or has no
+        meaning for what is asked for, or nothing is asked for.
     OutputError
         If an output cannot be written.
     Cancelled
@@ -110,7 +110,15 @@ def proceduralize_file(
     is_model = os.fspath(input).lower().endswith(EXTENSION)
     inputs = [path for path in (input, mask) if path is not None]
     _check_outputs(output, raster_output, is_model, dict(inputs=inputs, overwrite=overwrite))
+    if not raster_output:
+        _refuse(_changed(outputs), "no evaluated raster is asked for")
     if is_model:
+        reading = dict(
+            band=band != 1, nodata=len(nodata) > 0, below=below is not None,
+            above=above is not None, mask=mask is not None,
+        )  # fmt: skip
+        given = [name for name, is_given in reading.items() if is_given]
+        _refuse(_changed(options) + given, f"'{input}' is a model already")
         placed, told = read_terrain(input), {}
     else:
         source = raster.read(
@@ -156,6 +164,18 @@ def _check_outputs(output, raster_output, is_model, checks):
         raster.check_place(output, **checks)
     if raster_output:
         raster.check_output(raster_output, **checks)
+
+
+def _changed(options):
+    """Name the options that are not at their default."""
+    specs = specifications(type(options))
+    return [spec.name for spec in specs if getattr(options, spec.name) != spec.default]
+
+
+def _refuse(names, why):
+    """Refuse options that would do nothing."""
+    if names:
+        raise InputError(f"{' and '.join(names)} would do nothing, as {why}; leave it out")
 
 
 def _modelled(source, options, threads, progress):

@@ -29,7 +29,8 @@ class CompressOptions:
     atoms: int = option(
         int, None, "Atoms",
         "Use a tree of patches made of so many atoms, learned from the raster itself, instead of "
-        "the pyramid. Its default, where another option asks for patches: 128.",
+        "the pyramid; cosine waves where it is too small or flat to learn from. Its default, where "
+        "another option asks for patches: 128.",
         minimum=1, maximum=65536, advanced=True,
     )  # fmt: skip
     sparsity: int = option(

@@ -11,6 +11,9 @@ _ATOMS, _SPARSITY = 128, 2
 _SIDE = 10
 """Cells across a disc, where neither radius nor dictionary tells."""
 
+_SMALLEST_SIDE = 3
+"""With two cells, discs a cell apart would leave corners out."""
+
 _FINEST_STEP = 1e-3
 """In units."""
 
@@ -33,7 +36,8 @@ class PatchMaker:
     radius : float or None
         Ground metres.
     dictionary : path or None
-        Default: one is learned from the surface.
+        Default: one is learned from the surface, or consists of cosine waves where that is too
+        small or flat to learn from.
     max_error : int or None
         Error that a residual will leave, in the surface's unit: what is finer is not coded.
     effort : str
@@ -89,8 +93,7 @@ class PatchMaker:
         Raises
         ------
         InputError
-            If the dictionary cannot be read, the radius is too small or large, or the raster too
-            small to learn from.
+            If the dictionary cannot be read, or the radius is too small or large.
         Cancelled
             If ``progress`` asks to stop.
         """
@@ -130,26 +133,49 @@ class PatchMaker:
         return dictionary.resampled(*sides).samples, sides
 
     def _learned(self, surface, void, sparsity, threads, progress):
-        from demsmith.core.sparse.learning import learn
+        from demsmith.core.sparse import Dictionary
+        from demsmith.core.sparse.ksvd import TooFewSamplesError
+        from demsmith.core.sparse.learning import cosine_waves, learn
 
-        sides = self._sides((_SIDE, _SIDE), None)
-        # A radius of half the rows, in a unit in which that is as wide as the columns.
-        learned = learn(
-            surface, void, radius=sides[0] / 2, pixel_size=(sides[0] / sides[1], 1.0),
-            atoms=self.atoms or _ATOMS, sparsity=sparsity, iterations=_ROUNDS[self.effort],
-            threads=threads, progress=progress,
-        )  # fmt: skip
-        return learned.dictionary.samples, sides
+        sides, count = self._sides((_SIDE, _SIDE), None), self.atoms or _ATOMS
+        try:
+            # A radius of half the rows, in a unit in which that is as wide as the columns.
+            learned = learn(
+                surface, void, radius=sides[0] / 2, pixel_size=(sides[0] / sides[1], 1.0),
+                atoms=count, sparsity=sparsity, iterations=_ROUNDS[self.effort],
+                threads=threads, progress=progress,
+            )  # fmt: skip
+            dictionary = learned.dictionary
+        except TooFewSamplesError:
+            dictionary = Dictionary.of_samples(cosine_waves(*sides, count), *sides)
+        return dictionary.samples, sides
 
     def _sides(self, sides, size):
         """Give the cells across a disc: by the radius, a dictionary's, or as they are."""
         if self.radius is not None:
-            diameters = (2 * self.radius,) * 2
+            radii, what = (self.radius,) * 2, "a radius"
         elif size is not None:  # east-west comes first
-            diameters = sides[0] * size[1], sides[1] * size[0]
+            radii = sides[0] * size[1] / 2, sides[1] * size[0] / 2
+            what = f"the radius of the discs of '{self.dictionary}',"
         else:
             return sides
+        for radius, cell in zip(radii, self.cell, strict=True):
+            self._check_radius(what, radius, cell)
         return tuple(
-            max(2, round(diameter / cell))
-            for diameter, cell in zip(diameters, self.cell, strict=True)
+            max(_SMALLEST_SIDE, round(2 * radius / cell))
+            for radius, cell in zip(radii, self.cell, strict=True)
+        )
+
+    @staticmethod
+    def _check_radius(what, radius, cell):
+        from demsmith.core.sparse.patches import LARGEST_SIDE
+
+        if round(2 * radius / cell) > LARGEST_SIDE:
+            why = f"more than the {LARGEST_SIDE // 2} that a disc may have: give a smaller radius"
+        elif radius < (1 - 1e-6) * cell:  # cells on the ground are rounded
+            why = "less than one: give a larger radius"
+        else:
+            return
+        raise InputError(
+            f"{what} of {radius:.6g} m is {radius / cell:.3g} cells of {cell:.4g} m, {why}"
         )

@@ -25,12 +25,11 @@ import zlib
 import numpy as np
 
 from demsmith.core.errors import InputError
-from demsmith.core.sectioned import Kind, open_sectioned, write_sectioned
+from demsmith.core.sectioned import DICTIONARY as KIND
+from demsmith.core.sectioned import open_sectioned, write_sectioned
 from demsmith.core.sparse.atoms import CutAtoms, FunctionAtoms, SampledAtoms
 from demsmith.core.sparse.dictionary import LARGEST_FACTOR, MOST_SAMPLES, Dictionary
 from demsmith.core.sparse.patches import LARGEST_SIDE
-
-KIND = Kind(b"DSD\x1a", 1, "dictionary (.dsd)")
 
 PRECISIONS = ("float32", "float16", "int8")
 """How samples may be stored."""

@@ -44,6 +44,10 @@ _START_POOL = 10_000
 """Samples among which the first atoms are sought."""
 
 
+class TooFewSamplesError(InputError):
+    """There are fewer samples, or fewer that are not flat, than atoms that are to be learned."""
+
+
 @dataclass(frozen=True, eq=False)
 class LearnedAtoms:
     """What was learned.
@@ -366,7 +370,7 @@ def _checked(vectors):
 
 def _check_count(atoms, vectors):
     if not 1 <= atoms <= len(vectors):
-        raise TooLittleToLearnFrom(f"{atoms} atoms cannot be learned from {len(vectors)} samples")
+        raise TooFewSamplesError(f"{atoms} atoms cannot be learned from {len(vectors)} samples")
 
 
 def _unit(vectors):
@@ -392,7 +396,7 @@ def _spread(vectors, count, seed, progress, before=()):
     energies = np.einsum("ij,ij->i", members, members, dtype=np.float64)
     rests, free = energies.copy(), energies > 0
     if np.count_nonzero(free) < count:
-        raise InputError(
+        raise TooFewSamplesError(
             f"{count + len(before)} atoms cannot be learned from {np.count_nonzero(free)} samples "
             "that are not flat; ask for fewer, or give more terrain"
         )

@@ -12,7 +12,7 @@ from demsmith.core.pixel_size import metres
 from demsmith.core.progress import SILENT, Span, checkpoint
 from demsmith.core.sparse.atoms import CutAtoms, SampledAtoms, averaged
 from demsmith.core.sparse.dictionary import Dictionary
-from demsmith.core.sparse.ksvd import constrained, ksvd
+from demsmith.core.sparse.ksvd import TooFewSamplesError, constrained, ksvd
 from demsmith.core.sparse.metric import Metric
 from demsmith.core.sparse.options import LearnOptions
 from demsmith.core.sparse.patches import LARGEST_SIDE, disc_weights, gather_at
@@ -113,7 +113,7 @@ def learn(
         )
         places = places[np.sort(chosen)]
     if not len(places):
-        raise InputError(
+        raise TooFewSamplesError(
             f"no disc of {grounds.side_rows} by {grounds.side_columns} cells lies in the terrain "
             "without a void; fill it first, or make the radius smaller"
         )
@@ -261,8 +261,8 @@ def _free(grounds, places, options, threads, progress):
     vectors = metric.vectors(discs)
     start = None
     if options.sparsity > 1:
-        waves = cosine_waves(grounds.side_rows, grounds.side_columns)
-        start = metric.vectors(waves[: int(_WAVES * options.atoms)])
+        waves = cosine_waves(*_block(grounds, 1), int(_WAVES * options.atoms))
+        start = metric.vectors(waves)
     learned = ksvd(
         vectors, options.atoms, options.sparsity, iterations=options.iterations,
         tolerance=options.tolerance, seed=options.seed, start=start, threads=threads,
@@ -361,23 +361,33 @@ def _fitted(learned, samples):
     return np.linalg.solve(gram, shares.T @ samples.astype(np.float64)).astype(np.float32)
 
 
-def cosine_waves(side_rows, side_columns):
+def cosine_waves(side_rows, side_columns, count=None):
     """Give the two-dimensional cosine waves of a block, from long to short, but the constant.
 
     These are the atoms of the discrete cosine transform.
 
+    Parameters
+    ----------
+    side_rows, side_columns : int
+        Cells of the block.
+    count : int, optional
+        How many of the longest. Default, and at most: all.
+
     Returns
     -------
-    (side_rows * side_columns - 1, side_rows * side_columns) float32 array
+    (N, side_rows * side_columns) float32 array
+        ``N`` is ``count``, or ``side_rows * side_columns - 1``.
     """
-    rows, columns = (_waves(side) for side in (side_rows, side_columns))
-    waves = np.einsum("ai,bj->abij", rows, columns).reshape(side_rows * side_columns, -1)
     squares = [
         (a / side_rows) ** 2 + (b / side_columns) ** 2
         for a in range(side_rows)
         for b in range(side_columns)
     ]
-    return waves[np.argsort(squares, kind="stable")[1:]].astype(np.float32)
+    order = np.argsort(squares, kind="stable")[1:][:count]
+    rows = _waves(side_rows)[order // side_columns]
+    columns = _waves(side_columns)[order % side_columns]
+    waves = np.einsum("ni,nj->nij", rows, columns)
+    return waves.reshape(len(order), side_rows * side_columns).astype(np.float32)
 
 
 def _waves(side):

@@ -99,7 +99,7 @@ def test_info(demsmith, dem, sct):
     assert (told["low"], told["high"]) == (known.min(), known.max())
 
 
-@pytest.mark.parametrize("ratio", [10, 40])
+@pytest.mark.parametrize("ratio", [20, 40])
 def test_ratio(demsmith, dem, folder, ratio):
     sct = folder / "dem.sct"
     assert demsmith("compress", dem, sct, "--ratio", ratio).status == 0
@@ -193,6 +193,7 @@ def test_wrong_names_are_refused(demsmith, dem, sct, folder):
         (("info", dem), "is no Sparse Construction Tree (.sct)"),
         (("decompress", sct, folder / "back.tif", "--window", 270, 0, 20, 5), "are no part of"),
         (("decompress", sct, folder / "back.tif", "--window", 1, 2, 3), "--window"),
+        (("decompress", sct, folder / "back.tif", "--window", 1.5, 2, 3, 4), "no whole number"),
     ):
         status, _, err = demsmith(*words)
         assert status == 2

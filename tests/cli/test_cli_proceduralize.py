@@ -86,6 +86,7 @@ def test_help(demsmith):
         (("--raster", "m.png"), "m.png"),
         (("--band", 3), "band 3"),
         (("--below", 99999), "every cell is a void"),
+        (("--scale", 4), "scale would do nothing, as no evaluated raster is asked for"),
     ],
 )
 def test_refused(demsmith, dem, output, words, said):
@@ -107,3 +108,19 @@ def test_models_are_told_from_rasters(demsmith, dem, output, tmp_path):
         assert status == 2
         assert said in err
         assert os.listdir(output.parent) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("--family", "perlin"), "family"),
+        (("--sparsity", 3, "--below", 0), "sparsity and below"),
+        (("--band", 2, "--nodata", 5), "band and nodata"),
+    ],
+)
+def test_options_without_a_use_for_a_model_are_refused(demsmith, dem, output, words, named):
+    assert demsmith("proceduralize", dem, output, *QUICK).status == 0
+    status, _, err = demsmith("proceduralize", output, output.with_suffix(".tif"), *words)
+    assert status == 2
+    assert f"{named} would do nothing, as '{output}' is a model already" in err
+    assert os.listdir(output.parent) == ["model.dsp"]

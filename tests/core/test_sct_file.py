@@ -14,7 +14,7 @@ from demsmith.core.raster import BandMeta, Grid, Raster
 from demsmith.core.sct import CompressOptions, open_sct
 from demsmith.core.sct.coding import coded
 from demsmith.core.sct.file import KIND, stored_size, write_sct
-from demsmith.core.sectioned import open_sectioned, write_sectioned
+from demsmith.core.sectioned import DICTIONARY, TERRAIN, open_sectioned, write_sectioned
 
 UTM = (500000.0, 30.0, 0.0, 4600000.0, 0.0, -30.0)
 VOID = -9999
@@ -86,6 +86,54 @@ def test_any_window_is_a_part_of_the_whole(tmp_path):
             np.testing.assert_array_equal(part.values, whole.values[rows, columns])
             np.testing.assert_array_equal(part.void, whole.void[rows, columns])
             assert part.grid == whole.grid.part(rows, columns)
+
+
+def test_ends_of_a_window_may_be_open_or_counted_from_the_last(plain):
+    with open_sct(plain) as file:
+        whole = file.read(slice(None), slice(None)).values
+        assert whole.shape == (300, 290)
+        for rows, columns in (
+            (slice(250, None), slice(None, 7)),
+            (slice(-10, -2), slice(-290, None, 1)),
+            (slice(np.int64(4), np.int32(9)), None),
+        ):
+            part = file.read(rows, columns).values
+            np.testing.assert_array_equal(part, whole[rows, columns or slice(None)])
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (3, "rows is 3; give a slice"),
+        ((0, 5), "give a slice"),
+        (slice(0, 10, 2), "no step"),
+        (slice(10, 0, -1), "no step"),
+        (slice(0.0, 5.0), "whole numbers"),
+        (slice(0, 301), "rows 0 to 301 and columns"),
+        (slice(-301, None), "rows -301 to 300"),
+        (slice(5, 5), "rows 5 to 5"),
+    ],
+)
+def test_other_windows_are_refused(plain, rows, said):
+    with open_sct(plain) as file, pytest.raises(InputError, match=said):
+        file.read(rows)
+
+
+def test_a_closed_file_says_so(plain):
+    with open_sct(plain) as file:
+        pass
+    with pytest.raises(InputError, match=r"x\.sct' is closed"):
+        file.read()
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [(DICTIONARY, "dictionary"), (TERRAIN, "procedural terrain")]
+)
+def test_other_files_of_ours_are_told_by_name(tmp_path, kind, name):
+    write_sectioned(tmp_path / "x", kind, header={}, sections={})
+    said = rf"x' is a {name} \(.*\); what is read here is a Sparse Construction Tree \(.sct\)"
+    with pytest.raises(InputError, match=said):
+        open_sct(tmp_path / "x")
 
 
 def test_threads_change_nothing(tmp_path):

@@ -103,6 +103,62 @@ def test_a_dictionary(compress, dictionary):
         compress("none.dsd")
 
 
+@pytest.mark.parametrize("effort", ["low", "normal"])
+@pytest.mark.parametrize("shape", [(40, 50), (6, 7), (1, 30)])
+def test_where_nothing_can_be_learned_atoms_are_waves(tmp_path, shape, effort):
+    options = CompressOptions(sparsity=3, effort=effort)
+    flat, hilly = np.full(shape, 500, np.int16), hills(*shape)
+    for ground in (flat, hilly):
+        path = make_raster(tmp_path / "dem.tif", ground)
+        result = compress_file(path, tmp_path / "x.sct", options=options, overwrite=True)
+        assert result.tree == "patches"
+        wrong = decoded(tmp_path).values - ground.astype(float)
+        assert np.sqrt(np.mean(wrong**2)) == pytest.approx(result.rmse)
+        assert result.rmse <= 0.1 * max(np.std(ground), 5)
+
+
+@pytest.mark.parametrize(
+    ("radius", "said"),
+    [
+        (1e-4, r"a radius of 0\.0001 m is .* cells of .* m, less than one: give a larger radius"),
+        (1e5, r"a radius of 100000 m is .* cells of .* m, more than the 256 that a disc may have"),
+    ],
+)
+def test_a_radius_no_disc_can_have_is_told_in_cells(compress, radius, said):
+    with pytest.raises(InputError, match=said):
+        compress(radius=radius)
+
+
+def test_a_dictionary_that_is_too_coarse_is_told(tmp_path, dictionary):
+    fine = make_raster(
+        tmp_path / "fine.tif", hills(40, 40), geotransform=(5e5, 0.5, 0, 4.6e6, 0, -0.5),
+        crs="EPSG:32631",
+    )  # fmt: skip
+    said = r"the radius of the discs of '.*hills.dsd', of 4\d\d m is .* more than the 256 that"
+    with pytest.raises(InputError, match=said):
+        compress_file(fine, tmp_path / "x.sct", dictionary=dictionary)
+
+
+def test_a_radius_of_a_cell_is_enough(compress):
+    assert compress(radius=93, sparsity=1, atoms=4).rmse < compress(sparsity=1, atoms=4).rmse
+
+
+def test_an_older_virtual_raster_is_warned_of(compress, tmp_path):
+    assert compress(vrt=False).warnings == ()
+    (tmp_path / "x.sct.vrt").touch()
+    (warning,) = compress(vrt=False).warnings
+    assert "x.sct.vrt' describes the file that was here before" in warning
+    assert compress().warnings == ()
+
+
+@pytest.mark.parametrize("window", [(1.5, 2, 3, 4), (1, 2, 3), "1234", (1, 2, 3, None)])
+def test_a_window_is_four_whole_numbers(compress, tmp_path, window):
+    compress()
+    with pytest.raises(InputError, match="give four whole numbers"):
+        decompress_file(tmp_path / "x.sct", tmp_path / "back.tif", window=window)
+    assert not (tmp_path / "back.tif").exists()
+
+
 @pytest.mark.parametrize("scale", [0.25, 0.5, 2])
 def test_overviews_of_patches_lie_where_they_should(compress, dem, tmp_path, scale):
     compress(sparsity=4, atoms=32)

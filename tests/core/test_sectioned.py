@@ -271,7 +271,7 @@ def test_no_such_part(tmp_path):
 def test_a_closed_file_says_so(tmp_path):
     file = open_sectioned(written(tmp_path), KIND)
     file.close()
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="is closed"):
         file.part("base", 3)
 
 

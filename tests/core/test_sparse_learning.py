@@ -93,6 +93,7 @@ def test_decomposition_is_exact_where_discs_are_sums_of_few_atoms():
 
 def test_weighted_decomposition_refuses_what_does_not_fit():
     atoms = cosine_waves(10, 10)
+    np.testing.assert_array_equal(cosine_waves(10, 10, 7), atoms[:7])
     with pytest.raises(InputError, match="every cell is a void"):
         decompose_weighted(GROUND, GROUND < 1e9, dictionary=atoms, sparsity=1)
     with pytest.raises(InputError, match="do not fit"):
