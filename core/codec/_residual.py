@@ -120,6 +120,10 @@ def code_tile(
                 e3 += t3 * t3
             by_fixed = (f0 + f1) + (f2 + f3)
             by_moving = by_fixed + ((m0 + m1) + (m2 + m3))
+            if not abs(by_moving) < np.float32(1e15):  # of data that no raster makes
+                by_moving = by_fixed
+                for i in range(_ROOM):
+                    moving[i] = 0
             energy = (e0 + e1) + (e2 + e3)
             wrong_fixed = trust[0, column] + trust[0, column + 1]
             wrong_moving = trust[1, column] + trust[1, column + 1]
@@ -149,10 +153,8 @@ def code_tile(
                 away = abs(guess - np.float32(plain)) * scale
                 if near or away < np.float32(0.3):
                     slot = _PLAINS + near * 8 + half_octaves(away, 8)
-                    level_with = (
-                        np.int64(1) if abs(z[row, column] - plain) <= error else np.int64(0)
-                    )
-                    if code_adaptive(m, slot, level_with, decoding):
+                    joins = np.int64(abs(z[row, column] - plain) <= error)
+                    if code_adaptive(m, slot, joins, decoding):
                         z[row, column] = plain
                         surface[r, c] = np.float32(plain) - below
                         steps[1, column + 2] = 0
@@ -194,43 +196,45 @@ def code_tile(
             low = min(level, 23)
             if flat:
                 level = LEVELS - 1
+            half_level = min((level + 1) // 2, 15)
             at[0] = level
             at[1] = level * 4 + fine
             at[2] = 216 if flat else min(k_west, 5) * 36 + min(k_north, 5) * 6 + min(k_ne, 5)
             at[3] = doubt * LEVELS + low
             at[4] = half_octaves(rough * scale, 10) * LEVELS + low
             at[5] = up * 12 + left
-            at[6] = half_octaves(bend * scale * 4, 16) * 16 + min(level // 2 + level % 2, 15)
-            at[7] = late * 16 + min(level // 2 + level % 2, 15)
+            at[6] = half_octaves(bend * scale * 4, 16) * 16 + half_level
+            at[7] = late * 16 + half_level
+
             # The count of steps: its size without the lowest bits, those bits, its sign.
             distance = np.int64(z[row, column]) - centre
-            count_of = (abs(distance) + error) // step
+            count = (abs(distance) + error) // step
             drop = 0
             while not flat and wrong > np.float32(2 << drop) and drop < 20:
                 drop += 1
-            size = code_size(m, places, level, count_of >> drop, decoding)
-            tail = count_of & ((1 << drop) - 1)
+            size = code_size(m, places, level, count >> drop, decoding)
+            tail = count & ((1 << drop) - 1)
             if drop:
                 slot = _LOWS + (min(drop, 15) * 8 + min(size, 7)) * 4
                 top = code_adaptive(m, slot, tail >> (drop - 1), decoding)
                 tail = top << (drop - 1) | code_plain(
                     m, tail & ((1 << (drop - 1)) - 1), drop - 1, decoding
                 )
-            count_of = (size << drop) | tail
-            if count_of:
+            count = (size << drop) | tail
+            if count:
                 lean = min(max(int((by_fixed - by_moving) * scale * 2 + 4), 0), 7)
                 side = min(max(int((offset * (1 if error == 0 else scale) + 0.5) * 8), 0), 7)
-                slot = _SIGNS + (lean * 8 + side) * 8 + min(drop, 3) * 2 + min(count_of - 1, 1)
+                slot = _SIGNS + (lean * 8 + side) * 8 + min(drop, 3) * 2 + min(count - 1, 1)
                 if code_adaptive(m, slot, np.int64(1) if distance < 0 else np.int64(0), decoding):
-                    count_of = -count_of
-            value = centre + count_of * step
+                    count = -count
+            value = centre + count * step
             value = min(max(value, -(1 << 30)), 1 << 30)
             z[row, column] = value
 
             # What was learned.
             truth = np.float32(value) - below
             surface[r, c] = truth
-            steps[1, column + 2] = min(max(count_of, -127), 127)
+            steps[1, column + 2] = min(max(count, -127), 127)
             misses[1, column + 2] = np.float32(value) - guess
             truth -= middle
             late = abs(truth - by_fixed)

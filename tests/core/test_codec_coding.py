@@ -190,6 +190,15 @@ def test_params_that_cannot_be_are_refused(name, value):
         Decoder(encoded.params | {name: value}, encoded.part)
 
 
+def test_wild_values_leave_the_prediction_within_bounds():
+    """Jumps of all that an int32 holds, among level ground: weights that learn would burst."""
+    rng = np.random.default_rng(2)
+    values = rng.choice([-(2**30), 0, 1, 2**30], (64, 64), p=[0.02, 0.48, 0.48, 0.02])
+    values = values.astype(np.int32)
+    encoded = encode(values, np.zeros((64, 64), bool), options=CodecOptions(max_error=0, **QUICK))
+    assert np.array_equal(_decoded(encoded)[0], values)
+
+
 def test_damaged_parts_decode_to_something_within_bounds():
     values, void = _terrain((130, 130)), _voids((130, 130))
     encoded = encode(values, void, options=CodecOptions(max_error=6, **QUICK))
