@@ -11,7 +11,7 @@ from results import table
 from demsmith.core.sct import open_sct
 from demsmith.core.sparse import LearnOptions, learn_file
 
-ROUNDS = 5
+ROUNDS = 3
 ERROR = 5  # [m], where one is enough
 WINDOW = 256
 TILE = "sierra_nevada"

@@ -346,7 +346,7 @@ class Pyramid:
             for (start, stop), end in zip(span, fine_shape, strict=True)
         ]
         wanted = (span[0], odd[1]), (odd[0], span[1]), tuple(odd)
-        bands = [np.zeros([stop - start for start, stop in pair], np.float32) for pair in wanted]
+        steps = [np.zeros([stop - start for start, stop in pair], np.int32) for pair in wanted]
         scale = 1 << level
         cells = [
             (start * scale, min(stop * scale, end))
@@ -356,7 +356,8 @@ class Pyramid:
             held = self._tile(tile, level - 1)
             first = 3 * (geometry.levels - level)
             for kind, place in enumerate(geometry.bands(tile, level)):
-                _paste(bands[kind], wanted[kind], held[first + kind], place, self._step)
+                _paste(steps[kind], wanted[kind], held[first + kind], place)
+        bands = (_values(band, self._step) for band in steps)
         fine = inverse(np.ascontiguousarray(low), *bands)
         cut = tuple(
             slice(start - 2 * from_, stop - 2 * from_)
@@ -365,8 +366,8 @@ class Pyramid:
         return np.ascontiguousarray(fine[cut])
 
 
-def _paste(window, wanted, band, place, step):
-    """Copy what a tile's padded band has of a window, as coefficients."""
+def _paste(window, wanted, band, place):
+    """Copy what a tile's padded band has of a window."""
     inner = [(max(a, c), min(b, d)) for (a, b), (c, d) in zip(wanted, place, strict=True)]
     if any(start >= stop for start, stop in inner):
         return
@@ -374,4 +375,4 @@ def _paste(window, wanted, band, place, step):
     of = tuple(
         slice(a - p[0] + PAD, b - p[0] + PAD) for (a, b), p in zip(inner, place, strict=True)
     )
-    window[to] = _values(band[of], step)
+    window[to] = band[of]
