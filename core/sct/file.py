@@ -226,7 +226,8 @@ class SctFile:
                 rows.start, rows.stop, columns.start, columns.stop, level=level, progress=progress
             )
         scale = self.quantisation.unit / self.quantisation.divisor
-        return (units.astype(np.float64) + self.quantisation.first) * scale
+        with np.errstate(over="ignore", invalid="ignore"):  # of a scale that no raster has
+            return (units.astype(np.float64) + self.quantisation.first) * scale
 
     def voids_at(self, rows, columns, *, progress=SILENT):
         """Tell which cells are void.
