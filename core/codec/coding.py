@@ -324,8 +324,8 @@ class Decoder:
             slice(start - origin[0], stop - origin[0])
             for (start, stop), origin in zip(block, (rows, columns), strict=True)
         )
-        void[place] = self.voids(*block[0], *block[1])
         if self.max_error is None:
+            void[place] = self.voids(*block[0], *block[1])
             surface = self._tree_values(*block, 0, progress)
             limit = np.float32(_LARGEST)
             whole = np.rint(np.clip(np.nan_to_num(surface), -limit, limit)).astype(np.int64)
@@ -348,13 +348,14 @@ class Decoder:
 
         def decode(tile, part):
             around = _with_border(surface, corner, part, self.shape)
-            rows_in = part[0].stop - part[0].start
+            unknown = self._tile_voids(tile)[: part[0].stop - part[0].start]
             decoded = decode_residual(
-                self._tile_voids(tile)[:rows_in], around, self._weights, error=self.max_error,
+                unknown, around, self._weights, error=self.max_error,
                 plain=self._plain, part=self._part("residual", tile),
             )  # fmt: skip
             to, inner = _meeting(part, rows, columns)
             values[to] = decoded[inner].astype(np.int64) + self._offset
+            void[to] = unknown[inner]
 
         parallel.run(
             [partial(decode, tile, part) for tile, part in zip(tiles, cells, strict=True)],

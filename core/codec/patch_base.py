@@ -180,7 +180,7 @@ class _Quantised:
     def code(self, tile):
         """Give the bytes of a tile."""
         from demsmith.core.codec import _patch_coding as coding
-        from demsmith.core.codec._coder import BYTES_PER_DECISION
+        from demsmith.core.codec._coder import buffer_for
 
         rows, columns = self.layout.lines(tile)
         part = slice(*rows), slice(*columns)
@@ -190,7 +190,7 @@ class _Quantised:
         steps, indices = self.steps[part].copy(), self.indices[part].copy()
         decisions = counts.size * 100 + int(counts.sum()) * 100
         room = coding.workspace(*counts.shape)
-        data = np.empty(decisions * BYTES_PER_DECISION + 8, np.uint8)
+        data = buffer_for(decisions)
         coding.code_tile(
             means, counts, indices, steps, free, self.slopes, self.spread, data=data,
             decoding=False, **room,
@@ -209,11 +209,11 @@ class _Quantised:
 
 def _code_atoms(layout, steps):
     from demsmith.core.codec import _patch_coding as coding
-    from demsmith.core.codec._coder import BYTES_PER_DECISION
+    from demsmith.core.codec._coder import buffer_for
 
     samples = layout.blocks(steps.copy())
     room = coding.atoms_workspace()
-    data = np.empty(samples.size * 100 * BYTES_PER_DECISION + 8, np.uint8)
+    data = buffer_for(100 * samples.size)
     coding.code_atoms(samples, layout.grid.disc, data=data, decoding=False, **room)
     return data[: room["coder"][3]].tobytes()
 

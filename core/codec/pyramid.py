@@ -161,7 +161,8 @@ def _values(steps, step):
 def _code_root(root, part):
     """Code the root if ``part`` is None, else decode it into ``root``; give the bytes."""
     room = _residual.workspace(*root.shape)
-    data = buffer_for(64 * root.size) if part is None else np.frombuffer(part, np.uint8)
+    decisions = _residual.DECISIONS_PER_CELL * root.size
+    data = buffer_for(decisions) if part is None else np.frombuffer(part, np.uint8)
     _residual.code_tile(
         root, np.zeros(root.shape, bool), np.zeros(np.add(root.shape, 2), np.float32), 0,
         _residual.NO_PLAIN, _ROOT_WEIGHTS, data=data, decoding=part is not None, **room,
